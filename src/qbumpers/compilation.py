@@ -1,0 +1,73 @@
+"""How the package compiles its hot functions: one decorator, and a cache that notices changes.
+
+Numba's own cache looks at the file of the function alone; a compiled loop would keep calling an old
+decision rule after the rule's file had changed. Here the stamp of every cached function covers all
+sources of the package.
+"""
+
+import functools
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_SETTINGS = {"nogil": True, "error_model": "numpy"}
+INLINE = {"forceinline": True, **_SETTINGS}
+"""Settings for pieces of a hot loop: their calls must vanish, with all reference counting."""
+
+
+@functools.cache
+def source_stamp() -> str:
+    """A digest of every Python source of this package."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parent
+    for path in sorted(root.rglob("*.py")):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+class _PackageCache(FunctionCache):
+    """Numba's on-disk cache, stamped with the whole package instead of one file."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = IndexDataCacheFile(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=source_stamp(),
+        )
+
+
+def compiled(function: F) -> F:
+    """Compile a function of this package with Numba, kept on disk between processes.
+
+    Args:
+        function: a function in Numba's subset of Python.
+
+    Returns:
+        The same function; it compiles at its first call and then runs without the GIL.
+    """
+    dispatcher = numba.njit(**INLINE)(function)
+    try:
+        dispatcher._cache = _PackageCache(function)
+    except RuntimeError:  # no folder that can hold a cache: compile in every process
+        pass
+    return dispatcher
+
+
+def compiled_for_session(function: F) -> F:
+    """Compile a function whose source may change while the process lives: nothing kept on disk.
+
+    Args:
+        function: a function in Numba's subset of Python, for instance a user's own rule.
+
+    Returns:
+        The same function, compiled at its first call.
+    """
+    return numba.njit(**INLINE)(function)

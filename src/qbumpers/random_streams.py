@@ -1,0 +1,90 @@
+"""Random streams: who draws what, seeded so that order and number of workers change nothing.
+
+A trial owns four independent streams, one for each source of chance. They are NumPy's SFC64
+generators, stepped in compiled code; `numpy.random.SFC64` given the same seed words draws the same
+numbers.
+"""
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from qbumpers.compilation import compiled
+
+LEARNER, ASSISTANT, ENVIRONMENT, EVALUATION = range(4)
+"""Rows of a trial's streams: exploration; override noise; transitions; the greedy episode."""
+
+_STREAMS = 4
+_SEED_WORDS = 3
+_ONE = np.uint64(1)
+_SHIFT_3, _SHIFT_11 = np.uint64(3), np.uint64(11)
+_SHIFT_24, _SHIFT_40 = np.uint64(24), np.uint64(40)
+
+
+def content_words(content: Any) -> list[int]:
+    """Seed words for a piece of JSON-like data: equal data, equal words, whatever its key order.
+
+    Args:
+        content: anything that `json.dumps` takes.
+
+    Returns:
+        Eight 32-bit words of the SHA-256 digest of its canonical JSON.
+    """
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    digest = hashlib.sha256(text.encode()).digest()
+    return np.frombuffer(digest, dtype="<u4").tolist()
+
+
+def trial_streams(seed: int, content: Any, trials: range) -> np.ndarray:
+    """The streams of trials of one condition.
+
+    Args:
+        seed: of the experiment, not negative.
+        content: what the condition is, as JSON-like data; see `content_words`.
+        trials: which trials.
+
+    Returns:
+        uint64 [T, 4, 4]: for each trial and source of chance, the state of an SFC64 generator.
+    """
+    words = content_words(content)
+    seeds = np.empty((len(trials), _STREAMS, _SEED_WORDS), np.uint64)
+    for row, trial in enumerate(trials):
+        sequence = np.random.SeedSequence([seed, *words, trial])
+        seeds[row] = sequence.generate_state(seeds[row].size, np.uint64).reshape(seeds[row].shape)
+    return _warmed(seeds)
+
+
+@compiled
+def _warmed(seeds: np.ndarray) -> np.ndarray:
+    trials, streams, words = seeds.shape
+    states = np.ones((trials, streams, words + 1), np.uint64)
+    for trial in range(trials):
+        for stream in range(streams):
+            state = states[trial, stream]
+            state[:words] = seeds[trial, stream]
+            for _ in range(12):
+                draw(state)
+    return states
+
+
+@compiled
+def draw(state: np.ndarray) -> float:
+    """The next number of a stream, uniform in [0, 1).
+
+    SFC64 by C. Doty-Humphrey (PractRand), as in `numpy.random.SFC64`.
+
+    Args:
+        state: uint64 [4], changed in place.
+
+    Returns:
+        A float with 53 random bits.
+    """
+    a, b, c, counter = state[0], state[1], state[2], state[3]
+    total = a + b + counter
+    state[0] = b ^ (b >> _SHIFT_11)
+    state[1] = c + (c << _SHIFT_3)
+    state[2] = ((c << _SHIFT_24) | (c >> _SHIFT_40)) + total
+    state[3] = counter + _ONE
+    return (total >> _SHIFT_11) * (1.0 / 9007199254740992.0)

@@ -1,0 +1,24 @@
+"""Simulated people, many and fast."""
+
+from qbumpers.simulation.loops import Outcomes, Script, StateCounts, Steps
+from qbumpers.simulation.tabular import (
+    Condition,
+    Simulation,
+    make_condition,
+    record,
+    run,
+    simulate,
+)
+
+__all__ = [
+    "Condition",
+    "Outcomes",
+    "Script",
+    "Simulation",
+    "StateCounts",
+    "Steps",
+    "make_condition",
+    "record",
+    "run",
+    "simulate",
+]

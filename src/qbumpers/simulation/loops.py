@@ -1,0 +1,269 @@
+"""Trials of tabular learners: an assisted episode, then a greedy one without help, and again.
+
+The loops below are plain Python that Numba compiles once for each decision rule. A rule that cannot
+be compiled runs through the same loops uncompiled.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+
+from qbumpers.assistants.dispatch import decide, observe, start
+from qbumpers.borrowing import borrow, row
+from qbumpers.choice import best_value
+from qbumpers.compilation import INLINE, compiled, compiled_for_session
+from qbumpers.decisions import Noise, Situation, Step, projected_return
+from qbumpers.learners.perception import Experience, perceive
+from qbumpers.learners.q_learning import QLearner, choose, choose_greedily, learned, scheduled
+from qbumpers.random_streams import ASSISTANT, ENVIRONMENT, EVALUATION, LEARNER, draw
+from qbumpers.tasks.dynamics import TERMINATED, first_state, transition
+
+_WORDS = (0, 0, 0, 0)  # as wide as the state of a stream
+
+
+class Outcomes(NamedTuple):
+    """What happened, by trial and episode.
+
+    Attributes:
+        assisted_return: float64 [T, E], undiscounted, of the training episode with help.
+        unassisted_return: float64 [T, E], of the greedy episode without help that follows it.
+        assisted_length: int32 [T, E], steps.
+        unassisted_length: int32 [T, E], steps.
+        overrides: int32 [T, E], steps on which another action than the learner's was executed.
+        assisted_events: uint8 [T, E], bits of `qbumpers.tasks.dynamics` that occurred.
+        unassisted_events: uint8 [T, E].
+    """
+
+    assisted_return: np.ndarray
+    unassisted_return: np.ndarray
+    assisted_length: np.ndarray
+    unassisted_length: np.ndarray
+    overrides: np.ndarray
+    assisted_events: np.ndarray
+    unassisted_events: np.ndarray
+
+
+class StateCounts(NamedTuple):
+    """How often each state was acted in, over all trials and episodes.
+
+    Attributes:
+        assisted: int64 [S], steps of training episodes.
+        overridden: int64 [S], those of them on which the learner was overridden.
+        unassisted: int64 [S], steps of greedy episodes.
+    """
+
+    assisted: np.ndarray
+    overridden: np.ndarray
+    unassisted: np.ndarray
+
+
+class Steps(NamedTuple):
+    """Arrays [N] of step records, in order; `decisions.Step` says what each means.
+
+    `state` is where the step began; `values` is [N, A]; `episode` counts from 0.
+    """
+
+    episode: np.ndarray
+    state: np.ndarray
+    proposed: np.ndarray
+    executed: np.ndarray
+    credited: np.ndarray
+    overridden: np.ndarray
+    probability: np.ndarray
+    coin: np.ndarray
+    tie: np.ndarray
+    values: np.ndarray
+    projected_return: np.ndarray
+    reward: np.ndarray
+
+
+class Script(NamedTuple):
+    """Recorded proposals and noise, to be played again instead of drawing new ones: arrays [N]."""
+
+    proposed: np.ndarray
+    coin: np.ndarray
+    tie: np.ndarray
+
+
+@register_jitable(**INLINE)
+def _record(record: Any, index: int, episode: int, state: int, step: Step) -> None:
+    record.episode[index] = episode
+    record.state[index] = state
+    record.proposed[index] = step.proposed
+    record.executed[index] = step.executed
+    record.credited[index] = step.credited
+    record.overridden[index] = step.overridden
+    record.probability[index] = step.probability
+    record.coin[index] = step.coin
+    record.tie[index] = step.tie
+    record.values[index] = step.values
+    record.projected_return[index] = step.projected_return
+    record.reward[index] = step.reward
+
+
+@register_jitable(**INLINE)
+def _chance(possibilities: int, stream: Any) -> float:
+    """A number that chooses among possibilities, drawn only where there is a choice."""
+    return draw(stream) if possibilities > 1 else 0.0
+
+
+@register_jitable(**INLINE)
+def _learn(
+    own_values: np.ndarray,
+    state: int,
+    experience: Experience,
+    event: int,
+    next_state: int,
+    learner: QLearner,
+    learning_rate: float,
+    width: Any,
+) -> None:
+    if experience.action < 0:
+        return
+    future = 0.0
+    if not event & TERMINATED:
+        future = learner.discount * best_value(row(own_values, next_state, width))
+    values = row(own_values, state, width)
+    values[experience.action] = learned(
+        values[experience.action], experience.reward, future, learning_rate
+    )
+
+
+@register_jitable(**INLINE)
+def _assisted_episode(
+    dynamics, values, own_values, learner, perception, options, memory, streams, width,
+    rates, outcomes, place, counts, record, recorded, script,
+):  # fmt: skip
+    """One training episode; returns the rule's memory and how many steps there are so far."""
+    explore, chance, nature = streams[LEARNER], streams[ASSISTANT], streams[ENVIRONMENT]
+    epsilon, learning_rate = rates
+    state = first_state(dynamics, _chance(len(dynamics.start_states), nature))
+    start_value = best_value(row(values, state, width))
+    earned, discount, total = 0.0, 1.0, 0.0
+    overrides, events, length = 0, 0, 0
+    while length < dynamics.episode_limit:
+        if script is None:
+            own_row = row(own_values, state, width)
+            proposed = choose(own_row, epsilon, draw(explore), draw(explore))
+            noise = Noise(draw(chance), draw(chance))
+        else:
+            if recorded >= len(script.proposed):
+                break
+            proposed = script.proposed[recorded]
+            noise = Noise(script.coin[recorded], script.tie[recorded])
+        known = row(values, state, width)
+        situation = Situation(known, proposed, earned, discount, start_value)
+        decision = decide(situation, noise, options, memory)
+        executed = int(decision.action)
+        index = transition(dynamics, state, executed, _chance(dynamics.outcomes, nature))
+        reward, event = dynamics.reward[index], dynamics.events[index]
+        next_state = dynamics.next_state[index]
+        experience = perceive(perception, proposed, executed, reward, learner.penalty)
+        step = Step(
+            proposed, executed, experience.action, executed != proposed,
+            float(decision.probability), noise.coin, noise.tie, known,
+            projected_return(earned, discount, known[proposed]), reward,
+        )  # fmt: skip
+        memory = observe(memory, step, options)
+        _learn(own_values, state, experience, event, next_state, learner, learning_rate, width)
+        if counts is not None:
+            counts.assisted[state] += 1
+            counts.overridden[state] += step.overridden
+        if record is not None:
+            _record(record, recorded, place[1], state, step)
+        recorded += 1
+        earned += discount * reward
+        discount *= dynamics.discount
+        total += reward
+        overrides += step.overridden
+        events |= event
+        length += 1
+        state = next_state
+        if event & TERMINATED:
+            break
+    outcomes.assisted_return[place] = total
+    outcomes.assisted_length[place] = length
+    outcomes.overrides[place] = overrides
+    outcomes.assisted_events[place] = events
+    return memory, recorded
+
+
+@register_jitable(**INLINE)
+def _greedy_episode(dynamics, own_values, stream, width, outcomes, place, counts):
+    """One episode without help, exploration or learning."""
+    state = first_state(dynamics, _chance(len(dynamics.start_states), stream))
+    total, events, length = 0.0, 0, 0
+    while length < dynamics.episode_limit:
+        action = choose_greedily(row(own_values, state, width), draw(stream))
+        if counts is not None:
+            counts.unassisted[state] += 1
+        index = transition(dynamics, state, action, _chance(dynamics.outcomes, stream))
+        total += dynamics.reward[index]
+        events |= dynamics.events[index]
+        length += 1
+        state = dynamics.next_state[index]
+        if dynamics.events[index] & TERMINATED:
+            break
+    outcomes.unassisted_return[place] = total
+    outcomes.unassisted_length[place] = length
+    outcomes.unassisted_events[place] = events
+
+
+@compiled
+def run_trials(
+    dynamics, values, learner, perception, options, streams, width, own_values,
+    outcomes, counts, record, script,
+):  # fmt: skip
+    """Run trials one after another.
+
+    Args:
+        dynamics: the task.
+        values: float64 [S, A], Q* of the assistant.
+        learner: the simulated person.
+        perception: what they believe happened.
+        options: of the assistant; their type selects its rule.
+        streams: uint64 [4 T, 4], see `qbumpers.random_streams`; consumed.
+        width: a tuple of A integers, see `qbumpers.borrowing.row`.
+        own_values: float64 [S, A], room for the learner's values; overwritten.
+        outcomes: `Outcomes` of arrays [T, E], filled.
+        counts: `StateCounts`, added to; or None.
+        record: `Steps` with room for every assisted step, filled; or None.
+        script: `Script` to be played again; or None.
+
+    Returns:
+        Number of assisted steps.
+    """
+    trials, episodes = outcomes.assisted_return.shape
+    dynamics, values, own_values = borrow(dynamics), borrow(values), borrow(own_values)
+    outcomes, counts = borrow(outcomes), borrow(counts)
+    record, script = borrow(record), borrow(script)
+    recorded = 0
+    for trial in range(trials):
+        own_values[:] = learner.initial_value
+        memory = start(options)
+        trial_streams = (
+            row(streams, 4 * trial, _WORDS),
+            row(streams, 4 * trial + 1, _WORDS),
+            row(streams, 4 * trial + 2, _WORDS),
+            row(streams, 4 * trial + 3, _WORDS),
+        )
+        for episode in range(episodes):
+            rates = (
+                scheduled(learner.epsilon, episode, episodes),
+                scheduled(learner.learning_rate, episode, episodes),
+            )
+            memory, recorded = _assisted_episode(
+                dynamics, values, own_values, learner, perception, options, memory,
+                trial_streams, width, rates, outcomes, (trial, episode),
+                counts, record, recorded, script,
+            )  # fmt: skip
+            _greedy_episode(
+                dynamics, own_values, trial_streams[EVALUATION], width, outcomes,
+                (trial, episode), counts,
+            )  # fmt: skip
+    return recorded
+
+
+run_trials_for_session = compiled_for_session(run_trials.py_func)
+"""The same loops for rules from outside the package, whose sources may change at any time."""

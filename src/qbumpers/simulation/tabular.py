@@ -1,0 +1,258 @@
+"""Simulated people at tabular tasks: thousands of trials in seconds."""
+
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.errors import RequestError
+from qbumpers.learners import QLearner
+from qbumpers.learners import perception as named_perception
+from qbumpers.random_streams import trial_streams
+from qbumpers.simulation.loops import (
+    Outcomes,
+    Script,
+    StateCounts,
+    Steps,
+    run_trials,
+    run_trials_for_session,
+)
+from qbumpers.tasks import TabularTask
+from qbumpers.values import QValues, TabularValues, check_width, solve
+
+
+class Simulation(NamedTuple):
+    """What a simulation found.
+
+    Attributes:
+        outcomes: by trial and episode, arrays [T, E].
+        counts: by state, over all trials.
+    """
+
+    outcomes: Outcomes
+    counts: StateCounts
+
+    @property
+    def steps(self) -> int:
+        """Steps that the learners took, with help and without."""
+        return int(self.outcomes.assisted_length.sum() + self.outcomes.unassisted_length.sum())
+
+
+class Condition(NamedTuple):
+    """What a trial needs: everything but the seed and the number of the trial.
+
+    Attributes:
+        task: the task.
+        values: float64 [S, A], Q* of the assistant.
+        assistant: the assistant.
+        learner: the simulated person.
+        perception: name of what they believe happened.
+        episodes: E, assisted episodes of a trial, each followed by a greedy one without help.
+    """
+
+    task: TabularTask
+    values: np.ndarray
+    assistant: Assistant
+    learner: QLearner
+    perception: str
+    episodes: int
+
+    def content(self) -> dict[str, Any]:
+        """The condition as JSON-like data: it seeds the random streams and names stored results."""
+        return {
+            "task": self.task.digest(),
+            "values": TabularValues(self.values, 1.0, "", "").digest(),
+            "assistant": self.assistant.name,
+            "options": self.assistant.options._asdict(),
+            "learner": {
+                **self.learner._asdict(),
+                "epsilon": self.learner.epsilon._asdict(),
+                "learning_rate": self.learner.learning_rate._asdict(),
+            },
+            "perception": self.perception,
+            "episodes": self.episodes,
+        }
+
+
+def make_condition(
+    task: TabularTask,
+    assistant: Assistant | str,
+    *,
+    values: QValues | None = None,
+    learner: QLearner | None = None,
+    perception: str = "transition",
+    episodes: int = 100,
+) -> Condition:
+    """Check everything that a simulation needs, before any of it runs.
+
+    Args:
+        task: the task.
+        assistant: an assistant, or the name of one that needs no options.
+        values: Q* of the assistant; the exact solution where None.
+        learner: the simulated person; where None, the paper's, with the task's discount.
+        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
+        episodes: of a trial, at least 1.
+
+    Returns:
+        The condition.
+
+    Raises:
+        RequestError: where a name is unknown, a number is out of range, the values do not fit the
+            task, or an episode could start where the assistant's options do not suit it.
+    """
+    if episodes < 1:
+        raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")
+    if isinstance(assistant, str):
+        assistant = make_assistant(assistant)
+    named_perception(perception)
+    source = solve(task) if values is None else values
+    table = np.stack(
+        [
+            check_width(source(state), task.actions, f"in state {state}")
+            for state in range(task.states)
+        ]
+    )
+    for state in np.flatnonzero(task.start):
+        assistant.check_start(float(table[state].max()))
+    return Condition(
+        task, table, assistant, learner or QLearner(discount=task.discount), perception, episodes
+    )
+
+
+def simulate(
+    task: TabularTask,
+    assistant: Assistant | str,
+    *,
+    values: QValues | None = None,
+    learner: QLearner | None = None,
+    perception: str = "transition",
+    episodes: int = 100,
+    trials: int | range = 100,
+    seed: int = 0,
+    workers: int = 1,
+) -> Simulation:
+    """Simulate people who learn a task with an assistant's help (Section 4.2).
+
+    A trial is one person: `episodes` times an assisted episode from which they learn, then a greedy
+    one without help from which they do not. Equal arguments give equal numbers, whatever the
+    number of workers and whichever trials are run together.
+
+    Args:
+        task: the task.
+        assistant: an assistant, or the name of one that needs no options.
+        values: Q* of the assistant; the exact solution where None.
+        learner: the simulated person; where None, the paper's, with the task's discount.
+        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
+        episodes: of a trial, at least 1.
+        trials: how many, at least 1; or which.
+        seed: of the experiment, not negative.
+        workers: threads.
+
+    Returns:
+        Outcomes by trial and episode, and counts by state.
+
+    Raises:
+        RequestError: as `make_condition`, and for a number of trials below 1 or a negative seed.
+    """
+    condition = make_condition(
+        task, assistant, values=values, learner=learner, perception=perception, episodes=episodes
+    )
+    return run(condition, trials=trials, seed=seed, workers=workers)
+
+
+def run(
+    condition: Condition, *, trials: int | range, seed: int = 0, workers: int = 1
+) -> Simulation:
+    """Simulate a condition; `simulate` says what the arguments mean."""
+    trials = _checked_trials(trials, seed)
+    parts = np.array_split(np.asarray(trials), min(workers, len(trials)))
+    ranges = [range(int(part[0]), int(part[-1]) + 1) for part in parts]
+    if len(ranges) == 1:
+        simulations = [_run_block(condition, ranges[0], seed)]
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            simulations = list(pool.map(lambda block: _run_block(condition, block, seed), ranges))
+    outcomes = Outcomes(*map(np.concatenate, zip(*(s.outcomes for s in simulations), strict=True)))
+    counts = StateCounts(
+        *(sum(column) for column in zip(*(s.counts for s in simulations), strict=True))
+    )
+    return Simulation(outcomes, counts)
+
+
+def record(
+    condition: Condition, *, trial: int = 0, seed: int = 0, script: Script | None = None
+) -> Steps:
+    """Every assisted step of one trial.
+
+    Args:
+        condition: what to simulate.
+        trial: which trial.
+        seed: of the experiment.
+        script: proposals and noise to be played again, in place of a learner's and fresh noise;
+            the trial ends with the script.
+
+    Returns:
+        Step records, arrays [N].
+    """
+    room = condition.episodes * condition.task.episode_limit
+    steps = Steps(
+        *(np.zeros(room, np.int64) for _ in range(5)),
+        np.zeros(room, np.bool_),
+        *(np.zeros(room) for _ in range(3)),
+        np.zeros((room, condition.task.actions)),
+        *(np.zeros(room) for _ in range(2)),
+    )
+    trials = _checked_trials(range(trial, trial + 1), seed)
+    used = _call_loops(condition, trials, seed, _room(condition, 1), None, steps, script)
+    return Steps(*(array[:used] for array in steps))
+
+
+def _checked_trials(trials: int | range, seed: int) -> range:
+    if seed < 0:
+        raise RequestError(f"seed = {seed!r}; it must not be negative")
+    which = range(trials) if isinstance(trials, int) else trials
+    if len(which) < 1:
+        raise RequestError(f"trials = {trials!r}; at least 1 is needed")
+    return which
+
+
+def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
+    outcomes = _room(condition, len(trials))
+    counts = StateCounts(*(np.zeros(condition.task.states, np.int64) for _ in range(3)))
+    _call_loops(condition, trials, seed, outcomes, counts, None, None)
+    return Simulation(outcomes, counts)
+
+
+def _room(condition: Condition, trials: int) -> Outcomes:
+    kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
+    return Outcomes(*(np.zeros((trials, condition.episodes), kind) for kind in kinds))
+
+
+def _call_loops(
+    condition: Condition,
+    trials: range,
+    seed: int,
+    outcomes: Outcomes,
+    counts: StateCounts | None,
+    steps: Steps | None,
+    script: Script | None,
+) -> int:
+    rule = condition.assistant.rule
+    loops: Any = run_trials if rule.built_in else run_trials_for_session
+    if not rule.compiled:
+        loops = run_trials.py_func
+    return loops(
+        condition.task.dynamics(),
+        condition.values,
+        condition.learner,
+        named_perception(condition.perception),
+        condition.assistant.options,
+        trial_streams(seed, condition.content(), trials).reshape(-1, 4),
+        (0,) * condition.task.actions,
+        np.empty_like(condition.values),
+        outcomes,
+        counts,
+        steps,
+        script,
+    )

@@ -1,0 +1,73 @@
+"""A tabular task as loops step through it, compiled or not."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+
+from qbumpers.compilation import INLINE
+
+TERMINATED, SUCCESS, CRASH = 1, 2, 4
+"""Bits of `Dynamics.events`."""
+
+
+class Dynamics(NamedTuple):
+    """A task laid out flat: outcome k of action a in state s is at index (s A + a) K + k.
+
+    Attributes:
+        next_state: int64 [S A K].
+        reward: float64 [S A K].
+        cumulative: float64 [S A K], probability of this outcome or an earlier one.
+        events: uint8 [S A K], bits TERMINATED, SUCCESS and CRASH.
+        actions: A.
+        outcomes: K.
+        start_states: int64 [N], where episodes start.
+        start_cumulative: float64 [N].
+        discount: of the task.
+        episode_limit: steps after which an episode is truncated.
+    """
+
+    next_state: np.ndarray
+    reward: np.ndarray
+    cumulative: np.ndarray
+    events: np.ndarray
+    actions: int
+    outcomes: int
+    start_states: np.ndarray
+    start_cumulative: np.ndarray
+    discount: float
+    episode_limit: int
+
+
+@register_jitable(**INLINE)
+def sample(cumulative: np.ndarray, first: int, count: int, chance: float) -> int:
+    """Index of the outcome that `chance` falls on.
+
+    Args:
+        cumulative: float64, cumulative probabilities; those in question end at 1.
+        first: index of the first outcome in question.
+        count: how many there are.
+        chance: uniform in [0, 1).
+
+    Returns:
+        An index in [first, first + count).
+    """
+    index = first
+    while index < first + count - 1 and chance >= cumulative[index]:
+        index += 1
+    return index
+
+
+@register_jitable(**INLINE)
+def first_state(dynamics: Dynamics, chance: float) -> int:
+    """The state that an episode starts in; `chance` is uniform in [0, 1)."""
+    return dynamics.start_states[
+        sample(dynamics.start_cumulative, 0, len(dynamics.start_states), chance)
+    ]
+
+
+@register_jitable(**INLINE)
+def transition(dynamics: Dynamics, state: int, action: int, chance: float) -> int:
+    """Index of what follows an action; `chance` is uniform in [0, 1)."""
+    first = (state * dynamics.actions + action) * dynamics.outcomes
+    return sample(dynamics.cumulative, first, dynamics.outcomes, chance)

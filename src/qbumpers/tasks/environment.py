@@ -1,0 +1,51 @@
+"""Any tabular task as a Gymnasium environment."""
+
+from typing import Any
+
+import gymnasium
+from gymnasium import spaces
+
+from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, transition
+from qbumpers.tasks.tabular import TabularTask
+
+
+class TabularEnvironment(gymnasium.Env[int, int]):
+    """A tabular task to be stepped through; states and actions are numbers.
+
+    `info` of every step has `success` and `crash`, false where the task does not know them. The
+    step limit belongs to the registration (Gymnasium's TimeLimit), not to this class.
+
+    Args:
+        task: the task.
+    """
+
+    def __init__(self, task: TabularTask) -> None:
+        self.task = task
+        self.observation_space = spaces.Discrete(task.states)
+        self.action_space = spaces.Discrete(task.actions)
+        self._dynamics = task.dynamics()
+        self._state = 0
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
+        """Start an episode in a state drawn from the task's start distribution."""
+        super().reset(seed=seed)
+        self._state = int(first_state(self._dynamics, self.np_random.random()))
+        return self._state, {"success": False, "crash": False}
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Take an action.
+
+        Args:
+            action: in [0, A).
+
+        Returns:
+            Next state, reward, terminated, False, and `info`.
+        """
+        dynamics = self._dynamics
+        index = transition(dynamics, self._state, int(action), self.np_random.random())
+        self._state = int(dynamics.next_state[index])
+        events = int(dynamics.events[index])
+        info = {"success": bool(events & SUCCESS), "crash": bool(events & CRASH)}
+        return self._state, float(dynamics.reward[index]), bool(events & TERMINATED), False, info

@@ -1,0 +1,147 @@
+"""Exact Q* of a tabular task by dynamic programming."""
+
+import numpy as np
+import scipy.sparse.linalg
+from scipy import sparse
+
+from qbumpers.errors import RequestError
+from qbumpers.tasks.tabular import TabularTask
+from qbumpers.values.tabular import TabularValues
+
+DECIMALS = 9
+"""Values are rounded so: actions that are equally good in truth must not differ by round-off."""
+
+_SWEEPS = 200_000
+_CHANGE = 1e-12  # relative, at which undiscounted value iteration has converged
+
+
+def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
+    """Q* of a task, exact up to rounding to nine decimals.
+
+    Discounted: policy iteration, each policy evaluated by a linear solve. Undiscounted: value
+    iteration, after a check that every state that an episode can reach has a proper policy, one
+    that ends the episode with probability 1. Truncation by the step limit plays no part.
+
+    Args:
+        task: the task.
+        discount: of the values, in (0, 1]; the task's where None.
+
+    Returns:
+        The values. Terminal and unreachable states without a proper policy have value 0.
+
+    Raises:
+        RequestError: where the discount is out of range, or is 1 and a reachable state has no
+            proper policy, or values grow without bound.
+    """
+    discount = task.discount if discount is None else discount
+    if not 0 < discount <= 1:
+        raise RequestError(f"discount = {discount!r}; it must lie in (0, 1]")
+    table = _policy_iteration(task, discount) if discount < 1 else _value_iteration(task)
+    return TabularValues(
+        table=np.round(table, DECIMALS) + 0.0,  # + 0.0 turns -0.0 into 0.0
+        discount=discount,
+        task=task.name,
+        method="exact dynamic programming",
+    )
+
+
+def backup(task: TabularTask, state_values: np.ndarray, discount: float) -> np.ndarray:
+    """Bellman backup: Q(s, a) = sum_k p_k (r_k + discount (1 - terminated_k) V(s'_k)).
+
+    Args:
+        task: the task.
+        state_values: V, float64 [S].
+        discount: in (0, 1].
+
+    Returns:
+        float64 [S, A].
+    """
+    future = np.where(task.terminated, 0.0, state_values[task.next_state])
+    return (task.probability * (task.reward + discount * future)).sum(axis=2)
+
+
+def _policy_iteration(task: TabularTask, discount: float) -> np.ndarray:
+    states = np.arange(task.states)
+    policy = np.zeros(task.states, np.int64)
+    while True:
+        table = backup(task, _evaluate(task, policy, discount), discount)
+        best = table.max(axis=1)
+        kept = table[states, policy] >= best - 1e-12 * np.maximum(1, np.abs(best))
+        if kept.all():
+            return table
+        policy = np.where(kept, policy, table.argmax(axis=1))
+
+
+def _evaluate(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndarray:
+    """V of a policy [S]: (I - discount P) V = r, float64 [S]."""
+    states = np.arange(task.states)
+    probability = task.probability[states, policy]
+    reward = (probability * task.reward[states, policy]).sum(axis=1)
+    going_on = np.where(task.terminated[states, policy], 0.0, probability)
+    transition = sparse.csr_matrix(
+        (
+            going_on.ravel(),
+            (np.repeat(states, going_on.shape[1]), task.next_state[states, policy].ravel()),
+        ),
+        shape=(task.states, task.states),
+    )
+    return scipy.sparse.linalg.spsolve(
+        sparse.eye(task.states, format="csc") - discount * transition.tocsc(), reward
+    )
+
+
+def _value_iteration(task: TabularTask) -> np.ndarray:
+    proper = proper_states(task)
+    stranded = np.flatnonzero(reachable_states(task) & ~proper)
+    if len(stranded):
+        raise RequestError(
+            f"task {task.name}: from state {stranded[0]} no policy ends the episode with "
+            "probability 1, so its undiscounted values do not exist; give a discount below 1"
+        )
+    state_values = np.zeros(task.states)
+    for _ in range(_SWEEPS):
+        table = np.where(proper[:, None], backup(task, state_values, 1.0), 0.0)
+        fresh = table.max(axis=1)
+        change = np.abs(fresh - state_values).max()
+        state_values = fresh
+        if change <= _CHANGE * max(1.0, np.abs(fresh).max()):
+            return table
+    raise RequestError(
+        f"task {task.name}: undiscounted values did not settle in {_SWEEPS:,} sweeps, as where "
+        "reward can be collected for ever; give a discount below 1"
+    )
+
+
+def reachable_states(task: TabularTask) -> np.ndarray:
+    """States that an episode can act in, bool [S]."""
+    possible = (task.probability > 0) & ~task.terminated
+    reached = np.asarray(task.start) > 0
+    while True:
+        fresh = reached.copy()
+        fresh[task.next_state[possible & reached[:, None, None]]] = True
+        if (fresh == reached).all():
+            return reached
+        reached = fresh
+
+
+def proper_states(task: TabularTask) -> np.ndarray:
+    """States from which some policy ends the episode with probability 1, bool [S].
+
+    The greatest set within which every state can be kept while the end stays possible (the
+    almost-sure reachability of de Alfaro 1999).
+    """
+    possible = task.probability > 0
+    inside = np.ones(task.states, np.bool_)
+    while True:
+        # Actions that cannot leave the set, then the states that reach the end through them.
+        stays = (task.terminated | inside[task.next_state] | ~possible).all(axis=2)
+        ends = np.zeros(task.states, np.bool_)
+        while True:
+            leads = possible & (task.terminated | ends[task.next_state])
+            fresh = (stays & leads.any(axis=2)).any(axis=1) & inside
+            if (fresh == ends).all():
+                break
+            ends = fresh
+        if (ends == inside).all():
+            return inside
+        inside = ends
