@@ -1,10 +1,11 @@
 """How the package compiles its hot functions: one decorator, and a cache that notices changes.
 
 Numba's own cache looks at the file of the function alone; a compiled loop would keep calling an old
-decision rule after the rule's file had changed. Here the stamp of every cached function covers all
-sources of the package.
+decision rule after the rule's file had changed. Here the stamp of every cached function covers the
+sources of the whole package.
 """
 
+import contextlib
 import functools
 import hashlib
 from collections.abc import Callable
@@ -21,14 +22,19 @@ INLINE = {"forceinline": True, **_SETTINGS}
 """Settings for pieces of a hot loop: their calls must vanish, with all reference counting."""
 
 
+_NEVER_COMPILED = {"analysis", "cli.py", "experiments", "shared_control.py"}
+
+
 @functools.cache
 def source_stamp() -> str:
-    """A digest of every Python source of this package."""
+    """A digest of every source of this package that compiled code can come from."""
     digest = hashlib.sha256()
     root = Path(__file__).parent
     for path in sorted(root.rglob("*.py")):
-        digest.update(str(path.relative_to(root)).encode())
-        digest.update(path.read_bytes())
+        relative = path.relative_to(root)
+        if relative.parts[0] not in _NEVER_COMPILED:
+            digest.update(str(relative).encode())
+            digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -54,10 +60,8 @@ def compiled(function: F) -> F:
         The same function; it compiles at its first call and then runs without the GIL.
     """
     dispatcher = numba.njit(**INLINE)(function)
-    try:
+    with contextlib.suppress(RuntimeError):  # without a writable folder, every process compiles
         dispatcher._cache = _PackageCache(function)
-    except RuntimeError:  # no folder that can hold a cache: compile in every process
-        pass
     return dispatcher
 
 

@@ -24,22 +24,24 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:
         The error, to be raised by the caller.
     """
     names = list(known)
-    nearest = difflib.get_close_matches(str(name), names, n=1, cutoff=0.4)
-    hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
     allowed = ", ".join(names) if names else "there are none"
-    return RequestError(
-        f"unknown {kind} {name!r}{hint} Known: {allowed}"
-        if hint
-        else f"unknown {kind} {name!r}. Known: {allowed}"
-    )
+    return RequestError(f"unknown {kind} {name!r}{_nearest(name, names)}. Known: {allowed}")
 
 
-def from_validation(error: "ValidationError", where: str) -> RequestError:
+def _nearest(name: str, known: Iterable[str]) -> str:
+    nearest = difflib.get_close_matches(str(name), list(known), n=1, cutoff=0.4)
+    return f" (did you mean {nearest[0]!r}?)" if nearest else ""
+
+
+def from_validation(
+    error: "ValidationError", where: str, known_fields: Iterable[str] = ()
+) -> RequestError:
     """One readable message of everything that Pydantic found wrong.
 
     Args:
         error: what Pydantic raised.
         where: what was being checked, for instance "assistant stochastic-q-bumpers".
+        known_fields: names of fields, to suggest one for an unknown field.
 
     Returns:
         The error, to be raised by the caller.
@@ -48,5 +50,8 @@ def from_validation(error: "ValidationError", where: str) -> RequestError:
     for problem in error.errors(include_url=False):
         field = ".".join(str(part) for part in problem["loc"])
         given = "" if problem["type"] == "missing" else f" = {problem['input']!r}"
-        problems.append(f"{field}{given}: {problem['msg']}" if field else problem["msg"])
+        message = problem["msg"][:1].lower() + problem["msg"][1:]
+        if problem["type"] == "extra_forbidden":
+            message = f"unknown field{_nearest(str(problem['loc'][-1]), known_fields)}"
+        problems.append(f"{field}{given}: {message}" if field else message)
     return RequestError(f"{where}: " + "; ".join(problems))

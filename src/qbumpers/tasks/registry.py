@@ -50,7 +50,7 @@ def make_task(
             raise RequestError(f"task {name!r} takes no arguments: its numbers are fixed")
         return _tasks[name]()
     if name not in gymnasium.registry:
-        raise unknown_name("task", name, [*_tasks, *_tabular_environments()])
+        raise unknown_name("task", name, [*_tasks, *tabular_environments()])
     if discount is None:
         raise RequestError(
             f"task {name!r}: discount is missing; Gymnasium states none, give one in (0, 1]"
@@ -65,6 +65,6 @@ def make_task(
         )
 
 
-def _tabular_environments() -> list[str]:
-    """Ids of Gymnasium's toy-text environments that have a table."""
+def tabular_environments() -> list[str]:
+    """Ids of the toy-text environments of Gymnasium that have a transition table."""
     return [i for i in gymnasium.registry if i.startswith(("FrozenLake", "Taxi", "CliffWalking"))]

@@ -1,0 +1,44 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: help demo test test-slow lint bench docs clean
+
+help:  ## Show what there is to make
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(VENV)/installed  ## Repeat the paper's Cliff Walking experiment, with figures, into demo/
+	$(BIN)/qbumpers reproduce cliff-walking --out demo
+
+test: $(VENV)/installed-dev  ## Run the tests, some minutes
+	$(BIN)/pytest -m "not slow" -n 2
+
+test-slow: $(VENV)/installed-dev  ## Run the longer checks
+	$(BIN)/pytest -m slow -n 2
+
+lint: $(VENV)/installed-dev  ## Check style, types and which way imports point
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+bench: $(VENV)/installed-dev  ## Measure speed, as ratios to named baselines
+	$(BIN)/python benchmarks/run.py
+
+docs: $(VENV)/installed-docs  ## Build the documentation into site/
+	$(BIN)/mkdocs build --strict
+
+clean:  ## Remove what make made
+	rm -rf $(VENV) demo site
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.12")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	touch $@
+
+$(VENV)/installed-%: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$*]'
+	touch $@ $(VENV)/installed

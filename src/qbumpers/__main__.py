@@ -1,0 +1,5 @@
+"""`python -m qbumpers` is the command `qbumpers`."""
+
+from qbumpers.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""Experiments as data: their design, running them, and keeping what they find."""

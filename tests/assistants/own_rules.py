@@ -1,0 +1,56 @@
+"""Rules as a user would write them."""
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from qbumpers.choice import best_value, pick
+from qbumpers.decisions import Decision
+
+
+class NoOptions(NamedTuple):
+    pass
+
+
+def guide(situation, noise, options):
+    """Maximal assistance, written again."""
+    best = best_value(situation.values)
+    if situation.values[situation.proposed] >= best:
+        return Decision(situation.proposed, 0.0)
+    return Decision(pick(situation.values, best, noise.tie), 1.0)
+
+
+def guide_with_a_dictionary(situation, noise, options):
+    """The same decisions by means that Numba cannot compile."""
+    by_value = {}
+    for action, value in enumerate(situation.values.tolist()):
+        by_value.setdefault(value, []).append(action)
+    best = by_value[max(by_value)]
+    if situation.proposed in best:
+        return Decision(situation.proposed, 0.0)
+    return Decision(best[int(noise.tie * len(best))], 1.0)
+
+
+def watch(situation, noise, options):
+    """No assistance, written again."""
+    return Decision(situation.proposed, 0.0)
+
+
+class BudgetOptions(NamedTuple):
+    budget: Annotated[int, Field(ge=0)]
+
+
+def full_budget(options):
+    return options.budget
+
+
+def spend(memory, step, options):
+    return memory - step.overridden
+
+
+def guide_within_budget(situation, noise, options, memory):
+    """Maximal assistance until the advice is used up."""
+    best = best_value(situation.values)
+    if memory <= 0 or situation.values[situation.proposed] >= best:
+        return Decision(situation.proposed, 0.0)
+    return Decision(pick(situation.values, best, noise.tie), 1.0)

@@ -1,0 +1,115 @@
+"""Environments and a rule that the tests of shared control use."""
+
+from typing import Annotated, Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from pydantic import Field
+
+from qbumpers import (
+    Decision,
+    SharedControl,
+    TabularTask,
+    TabularValues,
+    make_task,
+    register_assistant,
+    solve,
+)
+from qbumpers.tasks import TabularEnvironment, cliff_walking
+
+UP, RIGHT, DOWN, LEFT = range(4)
+CLIFF = solve(cliff_walking())
+LAKE = solve(make_task("FrozenLake-v1", discount=0.95, is_slippery=True))
+
+
+def walking(assistant: Any = "none", values: Any = CLIFF, **options: Any) -> SharedControl:
+    """Cliff Walking under shared control."""
+    return SharedControl(gymnasium.make("qbumpers/CliffWalking-v0"), assistant, values, **options)
+
+
+def skating(assistant: Any = "none", values: Any = LAKE, **options: Any) -> SharedControl:
+    """The slippery Frozen Lake under shared control."""
+    lake = gymnasium.make("FrozenLake-v1", is_slippery=True)
+    return SharedControl(lake, assistant, values, **options)
+
+
+def bumpers(alpha: float = 0.7, **options: Any) -> dict[str, Any]:
+    """Arguments for Stochastic Q Bumpers."""
+    return {"assistant": "stochastic-q-bumpers", "alpha": alpha, **options}
+
+
+def play(environment: gymnasium.Env, actions: Any, **reset: Any) -> list[tuple]:
+    """Everything that `reset` and `step` returned until the actions or the episode end."""
+    returned: list[tuple] = [environment.reset(**reset)]
+    for action in actions:
+        returned.append(environment.step(action))
+        if returned[-1][2] or returned[-1][3]:
+            break
+    return returned
+
+
+def plain(returned: Any) -> Any:
+    """The same with lists for arrays, so that `==` compares it."""
+    if isinstance(returned, dict):
+        return {key: plain(value) for key, value in returned.items()}
+    if isinstance(returned, list | tuple):
+        return [plain(value) for value in returned]
+    return returned.tolist() if isinstance(returned, np.ndarray | np.generic) else returned
+
+
+class Dial(gymnasium.Env[np.ndarray, int]):
+    """Actions 5, 6 and 7, an array as observation; remembers what it was told to do."""
+
+    observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
+    action_space = gymnasium.spaces.Discrete(3, start=5)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.told: list[int] = []
+        self.options = options
+        return np.zeros(2, np.float32), {"temperature": 20}
+
+    def step(self, action):
+        self.told.append(action)
+        return np.full(2, 0.5, np.float32), 1.0, len(self.told) == 4, False, {"temperature": 21}
+
+
+def ladder() -> TabularEnvironment:
+    """Three states in a row: action 0 waits for -3, action 1 climbs for +2; the top ends."""
+    transition = np.zeros((3, 2, 3))
+    transition[range(3), 0, range(3)] = 1
+    transition[range(3), 1, [1, 2, 2]] = 1
+    reward = np.array([[-3.0, 2.0]] * 3)
+    return TabularEnvironment(
+        TabularTask.from_arrays(
+            transition, reward, [False, False, True], 0, discount=0.9, episode_limit=50
+        )
+    )
+
+
+LADDER = TabularValues(
+    np.array([[0.5, 3.8], [-1.2, 2.0], [0.0, 0.0]]), discount=0.9, task="ladder", method="by hand"
+)
+
+
+class AllowanceOptions(NamedTuple):
+    """How many overrides there are, for good."""
+
+    allowance: Annotated[int, Field(ge=0)]
+
+
+def start_allowance(options):
+    return options.allowance
+
+
+def observe_allowance(memory, step, options):
+    return memory - step.overridden
+
+
+@register_assistant("allowance", AllowanceOptions, start=start_allowance, observe=observe_allowance)
+def allowance(situation, noise, options, memory):
+    """Maximal assistance until the allowance of overrides is used up."""
+    best = situation.values.argmax()
+    if memory > 0 and situation.values[situation.proposed] < situation.values[best]:
+        return Decision(best, 1.0)
+    return Decision(situation.proposed, 0.0)

@@ -1,0 +1,68 @@
+"""Tasks and conditions that the simulation's tests run."""
+
+import numpy as np
+
+from qbumpers.assistants import make_assistant
+from qbumpers.learners import QLearner, Schedule
+from qbumpers.simulation import make_condition
+from qbumpers.tasks import TabularTask, cliff_walking, make_task
+from qbumpers.values import TabularValues
+
+BUMPERS = ("stochastic-q-bumpers", {"alpha": 0.7, "second": True})
+THRESHOLDS = ("local-q-thresholding", {"alpha": 0.0195, "second": True})
+
+
+def on_the_cliff(assistant, *, perception="transition", episodes=12, learner=None):
+    name, options = assistant
+    return make_condition(
+        cliff_walking(),
+        make_assistant(name, **options),
+        perception=perception,
+        episodes=episodes,
+        learner=learner,
+    )
+
+
+def on_slippery_ice():
+    task = make_task("FrozenLake-v1", discount=0.95, episode_limit=40, is_slippery=True)
+    assistant = make_assistant("stochastic-q-bumpers", alpha=0.8, v_min=-0.1)
+    return make_condition(task, assistant, episodes=40, learner=QLearner(discount=0.95))
+
+
+def in_a_random_world():
+    """Nine states, three actions, three outcomes of each, several starts; values that mislead."""
+    generator = np.random.default_rng(20190722)
+    shape = (9, 3, 3)
+    probability = generator.dirichlet(np.ones(3), shape[:2])
+    probability[:4, :, 1] = 0  # an impossible outcome between two possible ones
+    probability /= probability.sum(axis=2, keepdims=True)
+    start = np.zeros(9)
+    start[[1, 4, 6]] = 0.5, 0.25, 0.25
+    task = TabularTask(
+        name="random world",
+        next_state=generator.integers(0, 9, shape),
+        probability=probability,
+        reward=generator.normal(size=shape),
+        terminated=generator.random(shape) < 0.05,
+        start=start,
+        discount=0.9,
+        episode_limit=25,
+        success=generator.random(shape) < 0.1,
+        crash=generator.random(shape) < 0.1,
+    )
+    values = TabularValues(generator.normal(2, 1, (9, 3)), 0.9, task.name, "drawn at random")
+    learner = QLearner(
+        discount=0.8,
+        epsilon=Schedule(0.9, 0.1, 0.5),
+        learning_rate=Schedule(0.5, 0.2, 1.0),
+        initial_value=1.5,
+        penalty=0.75,
+    )
+    return make_condition(
+        task,
+        make_assistant("stochastic-q-bumpers", alpha=0.6, v_min=-3.0, p_max=0.9, clip=False),
+        values=values,
+        learner=learner,
+        perception="transition-disruption",
+        episodes=30,
+    )

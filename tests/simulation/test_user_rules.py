@@ -1,0 +1,105 @@
+"""Rules from outside the package run through the same loops."""
+
+import pytest
+
+from qbumpers.assistants import make_assistant, register_assistant
+from qbumpers.decisions import Decision
+from qbumpers.simulation import run
+from tests import reference_simulation as plain
+from tests.assistants.own_rules import (
+    BudgetOptions,
+    NoOptions,
+    full_budget,
+    guide,
+    guide_with_a_dictionary,
+    guide_within_budget,
+    spend,
+    watch,
+)
+from tests.simulation.conditions import on_the_cliff
+
+pytestmark = pytest.mark.usefixtures("own_registry")
+
+
+def plain_overrides(condition, rule, trials, observe=None):
+    found = []
+    for trial in range(trials):
+        reference = plain.ReferenceTrial(condition, rule, seed=0, trial=trial, observe=observe)
+        found.append([episode["assisted_overrides"] for episode in reference.run().episodes])
+    return found
+
+
+def test_a_rule_registered_again_is_simulated_from_then_on():
+    register_assistant("guide", NoOptions)(watch)
+    assert run(on_the_cliff(("guide", {}), episodes=3), trials=2).outcomes.overrides.sum() == 0
+    register_assistant("guide", NoOptions)(guide)
+    condition = on_the_cliff(("guide", {}), episodes=3)
+    found = run(condition, trials=2).outcomes
+    assert found.overrides.tolist() == plain_overrides(condition, plain.maximal, 2)
+    assert (found.assisted_return == 87).all()
+
+    with pytest.warns(UserWarning, match="'guide' cannot be compiled") as caught:
+        register_assistant("guide", NoOptions)(guide_with_a_dictionary)
+        interpreted = run(on_the_cliff(("guide", {}), episodes=3), trials=2, workers=2).outcomes
+    assert len(caught) == 1
+    for field, array in found._asdict().items():
+        assert getattr(interpreted, field).tolist() == array.tolist(), field
+
+
+class PlainBudget:
+    """The rule with memory, written plainly for one trial."""
+
+    def __init__(self, budget):
+        self.left = budget
+
+    def decide(self, situation, noise):
+        return (plain.maximal if self.left > 0 else plain.none)(situation, noise)
+
+    def observe(self, step):
+        self.left -= step.overridden
+
+
+def test_memory_lasts_a_trial_and_is_fresh_in_the_next():
+    register_assistant("budget", BudgetOptions, start=full_budget, observe=spend)(
+        guide_within_budget
+    )
+    condition = on_the_cliff(("budget", {"budget": 150}), episodes=5)
+    found = run(condition, trials=3).outcomes
+    for trial in range(3):
+        budget = PlainBudget(150)
+        reference = plain.ReferenceTrial(
+            condition, budget.decide, seed=0, trial=trial, observe=budget.observe
+        ).run()
+        for name in ("assisted_return", "assisted_overrides", "unassisted_return"):
+            field = name.replace("assisted_overrides", "overrides")
+            expected = [episode[name] for episode in reference.episodes]
+            assert getattr(found, field)[trial].tolist() == expected, name
+    assert (found.overrides.sum(axis=1) == 150).all()
+
+
+def test_a_memory_that_numba_cannot_compile_is_carried_too():
+    def names(options):
+        return {"left": options.budget}
+
+    def count_down(memory, step, options):
+        return {"left": memory["left"] - int(step.overridden)}
+
+    def guide_while_any_left(situation, noise, options, memory):
+        action, probability = (plain.maximal if memory["left"] > 0 else plain.none)(
+            situation, noise
+        )
+        return Decision(action, probability)
+
+    register_assistant("budget", BudgetOptions, start=full_budget, observe=spend)(
+        guide_within_budget
+    )
+    compiled = run(on_the_cliff(("budget", {"budget": 9}), episodes=2), trials=1).outcomes
+    with pytest.warns(UserWarning, match="'budget' cannot be compiled") as caught:
+        register_assistant("budget", BudgetOptions, start=names, observe=count_down)(
+            guide_while_any_left
+        )
+        interpreted = run(on_the_cliff(("budget", {"budget": 9}), episodes=2), trials=1).outcomes
+    assert len(caught) == 1
+    assert interpreted.overrides.sum() == 9
+    for field, array in compiled._asdict().items():
+        assert getattr(interpreted, field).tolist() == array.tolist(), field
