@@ -31,7 +31,8 @@ def borrow(arrays: Any) -> Any:
 
 @overload(borrow, strict=False, jit_options=INLINE)
 def _compiled_borrow(arrays: Any) -> Any:
-    return lambda arrays: _uncounted(arrays)
+    uncounted: Any = _uncounted
+    return lambda arrays: uncounted(arrays)
 
 
 @intrinsic
@@ -42,7 +43,8 @@ def _uncounted(typing_context: Any, arrays: Any) -> Any:
             view.meminfo = cgutils.get_null_value(view.meminfo.type)
             return view._getvalue()
         if isinstance(kind, types.BaseTuple):
-            for index, part in enumerate(kind):
+            parts: Any = kind
+            for index, part in enumerate(parts):
                 stripped = strip(context, builder, part, builder.extract_value(value, index))
                 value = builder.insert_value(value, stripped, index)
         return value
@@ -69,7 +71,8 @@ def row(table: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
 
 @overload(row, strict=False, jit_options=INLINE)
 def _compiled_row(table: Any, index: Any, width: Any) -> Any:
-    return lambda table, index, width: _borrowed(table, index, width)
+    borrowed: Any = _borrowed
+    return lambda table, index, width: borrowed(table, index, width)
 
 
 @intrinsic

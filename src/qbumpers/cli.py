@@ -206,7 +206,7 @@ def _summary_table(summary: Any) -> Table:
     table = _table("condition", "with the assistant", "without it", "overrides")
     for row in summary.iter_rows(named=True):
         cells = [
-            _interval(*(row[f"{measure}_{part}"] for part in ("mean", "low", "high")))
+            _interval(row[f"{measure}_mean"], row[f"{measure}_low"], row[f"{measure}_high"])
             for measure in ("assisted", "unassisted")
         ]
         table.add_row(row["condition"], *cells, f"{row['overrides_mean']:.2f}")
@@ -219,7 +219,8 @@ def _published_table(comparisons: Any) -> Table:
     for row in comparisons:
         digits = 2 if abs(row.published) < 1 else 1
         verdict = {True: "yes", False: "[red]no[/red]", None: "-"}[row.agrees]
-        measured = _interval(*row.measured, digits)
+        mean, low, high = row.measured
+        measured = _interval(mean, low, high, digits)
         table.add_row(row.what, f"{row.published:.{digits}f}", measured, verdict)
     return table
 

@@ -17,8 +17,8 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_SETTINGS = {"nogil": True, "error_model": "numpy"}
-INLINE = {"forceinline": True, **_SETTINGS}
+_SETTINGS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+INLINE: Any = {"forceinline": True, **_SETTINGS}
 """Settings for pieces of a hot loop: their calls must vanish, with all reference counting."""
 
 
@@ -59,7 +59,7 @@ def compiled(function: F) -> F:
     Returns:
         The same function; it compiles at its first call and then runs without the GIL.
     """
-    dispatcher = numba.njit(**INLINE)(function)
+    dispatcher: Any = numba.njit(**INLINE)(function)
     with contextlib.suppress(RuntimeError):  # without a writable folder, every process compiles
         dispatcher._cache = _PackageCache(function)
     return dispatcher
@@ -74,4 +74,19 @@ def compiled_for_session(function: F) -> F:
     Returns:
         The same function, compiled at its first call.
     """
-    return numba.njit(**INLINE)(function)
+    dispatcher: Any = numba.njit(**INLINE)(function)
+    return dispatcher
+
+
+def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The Python source of a function, to be called where compiled code is no help.
+
+    Handing a few numbers over to compiled code and back takes longer than working them out.
+
+    Args:
+        function: compiled or not.
+
+    Returns:
+        The function as it was written.
+    """
+    return getattr(function, "py_func", function)

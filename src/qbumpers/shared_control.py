@@ -1,4 +1,4 @@
-"""The Gymnasium wrapper: a person's or an agent's action goes in, the assisted action is executed."""
+"""The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.compilation import uncompiled
 from qbumpers.decisions import Noise, Situation, Step, projected_return
 from qbumpers.errors import RequestError
 from qbumpers.learners import perceive
@@ -19,8 +20,7 @@ RECORD, SUMMARY = "assistance", "assisted_episode"
 
 _NOISE_DRAWN = 256  # decisions for which noise is drawn at a time
 
-# Crossing into compiled code with a NamedTuple costs more than this function does.
-_perceive = getattr(perceive, "py_func", perceive)
+_perceive = uncompiled(perceive)
 
 
 class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -90,7 +90,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Start an episode; `options["noise"]` is for the assistant, the rest for the environment."""
+        """Start an episode; `options["noise"]` is the assistant's, the rest the environment's."""
         options = dict(options or {})
         if seed is not None:
             self._generator = np.random.Generator(np.random.SFC64([seed, *b"SharedControl"]))
@@ -169,16 +169,17 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
 
 
 def _discount_of(values: Any, discount: float | None) -> float:
-    stated = getattr(values, "discount", None)
-    if discount is None and stated is None:
-        raise RequestError(
-            "discount is missing: the values state none; give the one they were made with, in (0, 1]"
-        )
+    stated: float | None = getattr(values, "discount", None)
     if discount is not None and stated is not None and discount != stated:
         raise RequestError(
             f"discount = {discount!r}, but the values were made with {stated!r}; leave it out"
         )
     chosen = stated if discount is None else discount
+    if chosen is None:
+        raise RequestError(
+            "discount is missing: the values state none; give the one they were made with, in "
+            "(0, 1]"
+        )
     if not 0 < chosen <= 1:
         raise RequestError(f"discount = {chosen!r}; it must lie in (0, 1]")
     return float(chosen)

@@ -13,8 +13,9 @@ CONSTANT = Schedule(1.0, 1.0, 0.0)
 
 
 def assert_same(first, second):
-    for mine, yours in zip((*first.outcomes, *first.counts), (*second.outcomes, *second.counts)):
-        assert np.array_equal(mine, yours)
+    for mine, yours in zip(first, second, strict=True):
+        for field, array in mine._asdict().items():
+            assert np.array_equal(array, getattr(yours, field)), field
 
 
 @pytest.mark.parametrize("make", [lambda: on_the_cliff(BUMPERS), in_a_random_world])

@@ -1,8 +1,10 @@
 """Rules from outside the package run through the same loops."""
 
+from typing import NamedTuple
+
 import pytest
 
-from qbumpers.assistants import make_assistant, register_assistant
+from qbumpers.assistants import register_assistant
 from qbumpers.decisions import Decision
 from qbumpers.simulation import run
 from tests import reference_simulation as plain
@@ -21,12 +23,16 @@ from tests.simulation.conditions import on_the_cliff
 pytestmark = pytest.mark.usefixtures("own_registry")
 
 
-def plain_overrides(condition, rule, trials, observe=None):
-    found = []
-    for trial in range(trials):
-        reference = plain.ReferenceTrial(condition, rule, seed=0, trial=trial, observe=observe)
-        found.append([episode["assisted_overrides"] for episode in reference.run().episodes])
-    return found
+def assert_same(first, second):
+    for field, array in first._asdict().items():
+        assert array.tolist() == getattr(second, field).tolist(), field
+
+
+def plain_overrides(condition, rule, trials):
+    references = [
+        plain.ReferenceTrial(condition, rule, seed=0, trial=trial).run() for trial in range(trials)
+    ]
+    return [[e["assisted_overrides"] for e in reference.episodes] for reference in references]
 
 
 def test_a_rule_registered_again_is_simulated_from_then_on():
@@ -38,12 +44,34 @@ def test_a_rule_registered_again_is_simulated_from_then_on():
     assert found.overrides.tolist() == plain_overrides(condition, plain.maximal, 2)
     assert (found.assisted_return == 87).all()
 
+
+def test_a_rule_that_cannot_be_compiled_gives_the_same_numbers_and_one_warning():
+    register_assistant("guide", NoOptions)(guide)
+    compiled = run(on_the_cliff(("guide", {}), episodes=3), trials=2).outcomes
     with pytest.warns(UserWarning, match="'guide' cannot be compiled") as caught:
         register_assistant("guide", NoOptions)(guide_with_a_dictionary)
-        interpreted = run(on_the_cliff(("guide", {}), episodes=3), trials=2, workers=2).outcomes
     assert len(caught) == 1
-    for field, array in found._asdict().items():
-        assert getattr(interpreted, field).tolist() == array.tolist(), field
+    # Warnings are errors from here on: the simulation repeats none.
+    interpreted = run(on_the_cliff(("guide", {}), episodes=3), trials=2, workers=2).outcomes
+    assert_same(interpreted, compiled)
+
+
+def options_class():
+    class Options(NamedTuple):
+        pass
+
+    return Options
+
+
+def test_rules_whose_options_classes_have_the_same_name_are_kept_apart():
+    register_assistant("watch", options_class())(watch)
+    register_assistant("guide", options_class())(guide)
+    overrides = [
+        run(on_the_cliff((name, {}), episodes=3), trials=2).outcomes.overrides.sum()
+        for name in ("watch", "guide")
+    ]
+    assert overrides[0] == 0
+    assert overrides[1] > 0
 
 
 class PlainBudget:
@@ -63,10 +91,10 @@ def test_memory_lasts_a_trial_and_is_fresh_in_the_next():
     register_assistant("budget", BudgetOptions, start=full_budget, observe=spend)(
         guide_within_budget
     )
-    condition = on_the_cliff(("budget", {"budget": 150}), episodes=5)
+    condition = on_the_cliff(("budget", {"budget": 30}), episodes=5)
     found = run(condition, trials=3).outcomes
     for trial in range(3):
-        budget = PlainBudget(150)
+        budget = PlainBudget(30)
         reference = plain.ReferenceTrial(
             condition, budget.decide, seed=0, trial=trial, observe=budget.observe
         ).run()
@@ -74,7 +102,7 @@ def test_memory_lasts_a_trial_and_is_fresh_in_the_next():
             field = name.replace("assisted_overrides", "overrides")
             expected = [episode[name] for episode in reference.episodes]
             assert getattr(found, field)[trial].tolist() == expected, name
-    assert (found.overrides.sum(axis=1) == 150).all()
+    assert (found.overrides.sum(axis=1) == 30).all()
 
 
 def test_a_memory_that_numba_cannot_compile_is_carried_too():
@@ -98,8 +126,7 @@ def test_a_memory_that_numba_cannot_compile_is_carried_too():
         register_assistant("budget", BudgetOptions, start=names, observe=count_down)(
             guide_while_any_left
         )
-        interpreted = run(on_the_cliff(("budget", {"budget": 9}), episodes=2), trials=1).outcomes
     assert len(caught) == 1
+    interpreted = run(on_the_cliff(("budget", {"budget": 9}), episodes=2), trials=1).outcomes
     assert interpreted.overrides.sum() == 9
-    for field, array in compiled._asdict().items():
-        assert getattr(interpreted, field).tolist() == array.tolist(), field
+    assert_same(interpreted, compiled)

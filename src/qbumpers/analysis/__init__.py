@@ -1,0 +1,1 @@
+"""From results in files to measures, statistics, figures and a report."""

@@ -3,14 +3,14 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_type_hints
 
 import numba
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 
-from qbumpers.compilation import compiled_for_session
+from qbumpers.compilation import compiled_for_session, uncompiled
 from qbumpers.decisions import Decision, Noise, Situation, Step
 from qbumpers.errors import RequestError, unknown_name
 
@@ -68,12 +68,8 @@ class Assistant:
         return self.rule.start(self.options) if self.rule.start else None
 
     def decide(self, situation: Situation, noise: Noise, memory: Any = None) -> Decision:
-        """Decide once, from Python.
-
-        Runs the source of the rule: handing a situation over to compiled code and back takes
-        longer than deciding.
-        """
-        decide = getattr(self.rule.decide, "py_func", self.rule.decide)
+        """Decide once, from Python."""
+        decide = uncompiled(self.rule.decide)
         if self.rule.start is None:
             return decide(situation, noise, self.options)
         return decide(situation, noise, self.options, memory)
@@ -167,12 +163,12 @@ def _user_rule(
     # A fresh class for each registration: compiled code is selected by the type of the options,
     # and a rule registered again (an edited notebook cell) must not meet its old code.
     fresh = type(options_type.__name__, (options_type,), {"__slots__": ()})
-    functions = [
-        f and (f if isinstance(f, Dispatcher) else compiled_for_session(f))
-        for f in (function, start, observe)
+    plain = (function, start, observe)
+    compiled: list[Any] = [
+        f if f is None or isinstance(f, Dispatcher) else compiled_for_session(f) for f in plain
     ]
     try:
-        _compile_once(*functions, fresh)
+        _compile_once(compiled[0], compiled[1], compiled[2], fresh)
     except (NumbaError, TypeError) as error:
         reason = "; ".join(line.strip() for line in str(error).splitlines()[:4] if line.strip())
         warnings.warn(
@@ -180,7 +176,7 @@ def _user_rule(
             stacklevel=3,
         )
         return Rule(name, function, fresh, start, observe, check_start, False, False)
-    return Rule(name, functions[0], fresh, functions[1], functions[2], check_start, True, False)
+    return Rule(name, compiled[0], fresh, compiled[1], compiled[2], check_start, True, False)
 
 
 def _compile_once(decide: Any, start: Any, observe: Any, options_type: type) -> None:
@@ -189,29 +185,27 @@ def _compile_once(decide: Any, start: Any, observe: Any, options_type: type) -> 
     situation = numba.typeof(Situation(values, 0, 0.0, 1.0, 0.0))
     noise = numba.typeof(Noise(0.0, 0.0))
     options = numba.typeof(_sample(options_type))
-    arguments = (situation, noise, options)
+    arguments: tuple[Any, ...] = (situation, noise, options)
     if start is not None:
         start.compile((options,))
         memory = start.overloads[(options,)].signature.return_type
         step = numba.typeof(Step(0, 0, 0, False, 0.0, 0.0, 0.0, values, 0.0, 0.0))
         observe.compile((memory, step, options))
+        observed = observe.overloads[memory, step, options].signature.return_type
+        if observed != memory:
+            raise TypeError(f"observe returns {observed}, but start makes a memory of {memory}")
         arguments = (*arguments, memory)
     decide.compile(arguments)
+    decided = decide.overloads[arguments].signature.return_type
+    if getattr(decided, "instance_class", None) is not Decision:
+        raise TypeError(f"it returns {decided}, not a Decision")
 
 
 def _sample(options_type: Any) -> Any:
     """An instance with a value of the right type in each field, whatever the bounds."""
-    hints = {f: h for f, h in options_type.__annotations__.items()} if options_type._fields else {}
-    return options_type._make(
-        _SAMPLES.get(_plain(hints.get(f, float)), 0.0) for f in options_type._fields
-    )
-
-
-_SAMPLES: dict[Any, Any] = {float: 0.0, int: 0, bool: False}
-
-
-def _plain(hint: Any) -> Any:
-    return getattr(hint, "__origin__", hint)
+    samples = {float: 0.0, int: 0, bool: False}
+    hints = get_type_hints(options_type)
+    return options_type._make(samples.get(hints.get(f), 0.0) for f in options_type._fields)
 
 
 def rule_for_options(options_type: type) -> Rule:

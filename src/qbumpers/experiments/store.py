@@ -1,5 +1,6 @@
 """Results in a folder: written atomically, never computed twice, read by the analysis."""
 
+import contextlib
 import hashlib
 import json
 import os
@@ -86,10 +87,8 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
             f"cannot write {path}: {getattr(error, 'strerror', None) or error}"
         ) from error
     finally:
-        try:
+        with contextlib.suppress(OSError):  # an unwritable folder: nothing was left there
             temporary.unlink(missing_ok=True)
-        except OSError:  # an unwritable folder: nothing was left there
-            pass
 
 
 def digest(content: Any) -> str:

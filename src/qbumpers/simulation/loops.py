@@ -12,7 +12,7 @@ from numba.extending import register_jitable
 from qbumpers.assistants.dispatch import decide, observe, start
 from qbumpers.borrowing import borrow, row
 from qbumpers.choice import best_value
-from qbumpers.compilation import INLINE, compiled, compiled_for_session
+from qbumpers.compilation import INLINE, compiled, compiled_for_session, uncompiled
 from qbumpers.decisions import Noise, Situation, Step, projected_return
 from qbumpers.learners.perception import Experience, perceive
 from qbumpers.learners.q_learning import QLearner, choose, choose_greedily, learned, scheduled
@@ -265,5 +265,5 @@ def run_trials(
     return recorded
 
 
-run_trials_for_session = compiled_for_session(run_trials.py_func)
+run_trials_for_session = compiled_for_session(uncompiled(run_trials))
 """The same loops for rules from outside the package, whose sources may change at any time."""

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners import QLearner
 from qbumpers.learners import perception as named_perception
@@ -175,7 +176,7 @@ def run(
             simulations = list(pool.map(lambda block: _run_block(condition, block, seed), ranges))
     outcomes = Outcomes(*map(np.concatenate, zip(*(s.outcomes for s in simulations), strict=True)))
     counts = StateCounts(
-        *(sum(column) for column in zip(*(s.counts for s in simulations), strict=True))
+        *map(np.sum, zip(*(s.counts for s in simulations), strict=True), (0, 0, 0))
     )
     return Simulation(outcomes, counts)
 
@@ -197,11 +198,18 @@ def record(
     """
     room = condition.episodes * condition.task.episode_limit
     steps = Steps(
-        *(np.zeros(room, np.int64) for _ in range(5)),
-        np.zeros(room, np.bool_),
-        *(np.zeros(room) for _ in range(3)),
-        np.zeros((room, condition.task.actions)),
-        *(np.zeros(room) for _ in range(2)),
+        episode=np.zeros(room, np.int64),
+        state=np.zeros(room, np.int64),
+        proposed=np.zeros(room, np.int64),
+        executed=np.zeros(room, np.int64),
+        credited=np.zeros(room, np.int64),
+        overridden=np.zeros(room, np.bool_),
+        probability=np.zeros(room),
+        coin=np.zeros(room),
+        tie=np.zeros(room),
+        values=np.zeros((room, condition.task.actions)),
+        projected_return=np.zeros(room),
+        reward=np.zeros(room),
     )
     trials = _checked_trials(range(trial, trial + 1), seed)
     used = _call_loops(condition, trials, seed, _room(condition, 1), None, steps, script)
@@ -241,7 +249,7 @@ def _call_loops(
     rule = condition.assistant.rule
     loops: Any = run_trials if rule.built_in else run_trials_for_session
     if not rule.compiled:
-        loops = run_trials.py_func
+        loops = uncompiled(run_trials)
     return loops(
         condition.task.dynamics(),
         condition.values,

@@ -1,4 +1,4 @@
-"""Cliff Walking (Sutton and Barto 2018, p. 132) with the paper's bonus at the goal (Section 4.1)."""
+"""Cliff Walking (Sutton and Barto 2018, p. 132) with a bonus at the goal (Section 4.1)."""
 
 from typing import Any
 

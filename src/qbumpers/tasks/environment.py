@@ -9,7 +9,7 @@ from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, tra
 from qbumpers.tasks.tabular import TabularTask
 
 
-class TabularEnvironment(gymnasium.Env[int, int]):
+class TabularEnvironment(gymnasium.Env[Any, Any]):
     """A tabular task to be stepped through; states and actions are numbers.
 
     `info` of every step has `success` and `crash`, false where the task does not know them. The

@@ -59,10 +59,9 @@ def make_task(
         environment = gymnasium.make(name, disable_env_checker=True, **arguments)
     except (TypeError, gymnasium.error.Error, ImportError) as error:
         raise RequestError(f"task {name!r}: {error}") from error
-    with environment:
-        return TabularTask.from_gymnasium(
-            environment, discount=discount, episode_limit=episode_limit
-        )
+    task = TabularTask.from_gymnasium(environment, discount=discount, episode_limit=episode_limit)
+    environment.close()
+    return task
 
 
 def tabular_environments() -> list[str]:

@@ -198,28 +198,33 @@ class TabularTask:
         states, actions = len(table), len(table[0])
         outcomes = max(len(table[s][a]) for s in range(states) for a in range(actions))
         shape = (states, actions, outcomes)
-        fields = {
-            "probability": np.zeros(shape),
-            "next_state": np.zeros(shape, np.int64),
-            "reward": np.zeros(shape),
-            "terminated": np.zeros(shape, np.bool_),
-        }
-        judged = {
-            k: (np.zeros(shape, np.bool_), j) for k, j in (("success", success), ("crash", crash))
-        }
+        probability, next_state = np.zeros(shape), np.zeros(shape, np.int64)
+        reward, terminated = np.zeros(shape), np.zeros(shape, np.bool_)
+        judges = {"success": success, "crash": crash}
+        judged = {name: np.zeros(shape, np.bool_) for name in judges}
         for s, a in np.ndindex(states, actions):
             for k, (p, to, r, done) in enumerate(table[s][a]):
-                for field, value in zip(fields.values(), (p, to, r, done), strict=True):
-                    field[s, a, k] = value
-                for flags, judge in judged.values():
-                    flags[s, a, k] = judge is not None and p > 0 and judge(s, a, to, r, done)
-        events = {k: flags if judge else None for k, (flags, judge) in judged.items()}
+                place = s, a, k
+                probability[place], next_state[place] = p, to
+                reward[place], terminated[place] = r, done
+                for event, judge in judges.items():
+                    judged[event][place] = judge is not None and p > 0 and judge(s, a, to, r, done)
+        events = {event: judged[event] if judge else None for event, judge in judges.items()}
         if success is None and crash is None:
-            events = _endings(fields["terminated"], fields["reward"], fields["probability"])
+            events = _endings(terminated, reward, probability)
         return cls(
-            name=name, start=np.asarray(start, np.float64), discount=discount,
-            episode_limit=episode_limit, grid=grid, **fields, **events,
-        )  # fmt: skip
+            name=name,
+            next_state=next_state,
+            probability=probability,
+            reward=reward,
+            terminated=terminated,
+            start=np.asarray(start, np.float64),
+            discount=discount,
+            episode_limit=episode_limit,
+            success=events["success"],
+            crash=events["crash"],
+            grid=grid,
+        )
 
     @classmethod
     def from_gymnasium(
@@ -253,8 +258,8 @@ class TabularTask:
         if table is None or start is None:
             missing = "P" if table is None else "initial_state_distrib"
             raise RequestError(
-                f"environment {name} has no attribute {missing}: a tabular task needs its transition "
-                "table; give one with TabularTask.from_table or TabularTask.from_arrays"
+                f"environment {name} has no attribute {missing}: a tabular task needs its "
+                "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
             )
         limit = episode_limit or (environment.spec and environment.spec.max_episode_steps)
         if not limit:

@@ -85,9 +85,8 @@ def _evaluate(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndar
         ),
         shape=(task.states, task.states),
     )
-    return scipy.sparse.linalg.spsolve(
-        sparse.eye(task.states, format="csc") - discount * transition.tocsc(), reward
-    )
+    system = sparse.eye(task.states, format="csc") - discount * transition.tocsc()
+    return np.asarray(scipy.sparse.linalg.spsolve(system, reward))
 
 
 def _value_iteration(task: TabularTask) -> np.ndarray:
@@ -138,7 +137,7 @@ def proper_states(task: TabularTask) -> np.ndarray:
         ends = np.zeros(task.states, np.bool_)
         while True:
             leads = possible & (task.terminated | ends[task.next_state])
-            fresh = (stays & leads.any(axis=2)).any(axis=1) & inside
+            fresh = np.any(stays & leads.any(axis=2), axis=1) & inside
             if (fresh == ends).all():
                 break
             ends = fresh

@@ -63,10 +63,9 @@ def tightest_cluster(summary: pl.DataFrame) -> pl.DataFrame:
     """
     if summary.height < 2:
         return summary.head(0)
-    reach = float(summary["assisted_mean"].max() - summary["assisted_mean"].min())  # type: ignore[operator]
+    reach = np.ptp(summary["assisted_mean"].to_numpy())
     for part in summary.partition_by("assistant", maintain_order=True):
-        width = part["assisted_mean"].max() - part["assisted_mean"].min()  # type: ignore[operator]
-        if part.height >= 5 and width < 0.1 * reach:
+        if part.height >= 5 and np.ptp(part["assisted_mean"].to_numpy()) < 0.1 * reach:
             return part
     return summary.head(0)
 

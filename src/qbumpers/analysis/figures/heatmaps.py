@@ -27,7 +27,7 @@ def heatmap_figure(states: pl.DataFrame, conditions: Sequence[str], episodes: in
     Returns:
         The figure; grey cells were never entered.
     """
-    rows, columns = int(states["row"].max()) + 1, int(states["column"].max()) + 1  # type: ignore[arg-type]
+    rows, columns = (int(states[name].to_numpy().max()) + 1 for name in ("row", "column"))
     height = 0.75 + len(conditions) * (0.55 + 3.4 * rows / columns)
     norm = LogNorm(1e-3, 10, clip=True)
     with figure(11, height) as drawing:

@@ -31,7 +31,7 @@ _MARKERS = {"none": "s", "maximal": "D", "local-q-thresholding": "^", "stochasti
 _SPARE_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 _SPARE_MARKERS = ("v", "P", "X", "<")
 
-_STYLE: dict[str, Any] = {
+_STYLE: Any = {
     "font.size": 10,
     "axes.titlesize": 11,
     "axes.titleweight": "bold",

@@ -1,20 +1,11 @@
-"""Environments and a rule that the tests of shared control use."""
+"""Environments under shared control, and ways to play them, that several test modules use."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
-from pydantic import Field
 
-from qbumpers import (
-    Decision,
-    SharedControl,
-    TabularTask,
-    TabularValues,
-    make_task,
-    register_assistant,
-    solve,
-)
+from qbumpers import SharedControl, TabularTask, TabularValues, make_task, solve
 from qbumpers.tasks import TabularEnvironment, cliff_walking
 
 UP, RIGHT, DOWN, LEFT = range(4)
@@ -88,28 +79,5 @@ def ladder() -> TabularEnvironment:
 
 
 LADDER = TabularValues(
-    np.array([[0.5, 3.8], [-1.2, 2.0], [0.0, 0.0]]), discount=0.9, task="ladder", method="by hand"
+    np.array([[0.42, 3.8], [-1.2, 2.0], [0.0, 0.0]]), discount=0.9, task="ladder", method="by hand"
 )
-
-
-class AllowanceOptions(NamedTuple):
-    """How many overrides there are, for good."""
-
-    allowance: Annotated[int, Field(ge=0)]
-
-
-def start_allowance(options):
-    return options.allowance
-
-
-def observe_allowance(memory, step, options):
-    return memory - step.overridden
-
-
-@register_assistant("allowance", AllowanceOptions, start=start_allowance, observe=observe_allowance)
-def allowance(situation, noise, options, memory):
-    """Maximal assistance until the allowance of overrides is used up."""
-    best = situation.values.argmax()
-    if memory > 0 and situation.values[situation.proposed] < situation.values[best]:
-        return Decision(best, 1.0)
-    return Decision(situation.proposed, 0.0)

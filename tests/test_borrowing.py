@@ -1,0 +1,81 @@
+"""Borrowed arrays: the same memory, the same numbers, no references counted."""
+
+import sys
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from qbumpers.borrowing import borrow, row
+from qbumpers.compilation import compiled_for_session
+
+
+class Tables(NamedTuple):
+    first: np.ndarray
+    factor: float
+    second: np.ndarray
+
+
+@compiled_for_session
+def weighted_sum(tables):
+    tables = borrow(tables)
+    total = 0.0
+    for index in range(len(tables.first)):
+        total += tables.factor * tables.first[index] * tables.second[index]
+    return total
+
+
+@compiled_for_session
+def sum_and_double(table, width):
+    """The sum of every row; each is doubled in place."""
+    table = borrow(table)
+    sums = np.zeros(len(table))
+    for index in range(len(table)):
+        values = row(table, index, width)
+        for action in range(len(values)):
+            sums[index] += values[action]
+            values[action] *= 2
+    return sums
+
+
+@compiled_for_session
+def is_nothing(thing):
+    return borrow(thing) is None
+
+
+@pytest.fixture(params=["compiled", "interpreted"])
+def as_host_runs_it(request):
+    return (lambda f: f) if request.param == "compiled" else (lambda f: f.py_func)
+
+
+def some_tables():
+    generator = np.random.default_rng(3)
+    return Tables(generator.random(50), 0.5, generator.random(50))
+
+
+def test_borrowed_tables_hold_the_same_numbers(as_host_runs_it):
+    tables = some_tables()
+    expected = tables.factor * (tables.first @ tables.second)
+    assert as_host_runs_it(weighted_sum)(tables) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (5, 2), (48, 4)])
+def test_a_row_is_a_view_of_the_right_part_of_its_table(as_host_runs_it, shape):
+    table = np.random.default_rng(4).integers(-9, 9, shape).astype(float)
+    before = table.copy()
+    sums = as_host_runs_it(sum_and_double)(table, (0,) * shape[1])
+    assert np.array_equal(sums, before.sum(axis=1))
+    assert np.array_equal(table, 2 * before)
+
+
+def test_nothing_can_be_borrowed(as_host_runs_it):
+    assert as_host_runs_it(is_nothing)(None)
+    assert not as_host_runs_it(is_nothing)(some_tables())
+
+
+def test_arrays_outlive_any_number_of_loans():
+    tables = some_tables()
+    counts = [sys.getrefcount(tables.first), sys.getrefcount(tables.second)]
+    expected = weighted_sum(tables)
+    assert all(weighted_sum(tables) == expected for _ in range(100))
+    assert [sys.getrefcount(tables.first), sys.getrefcount(tables.second)] == counts

@@ -1,0 +1,122 @@
+"""The cache of compiled code, tried on a small package with a copy of the module in it."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from qbumpers import compilation
+
+RULE = """
+from pocket.compilation import compiled
+@compiled
+def rule():
+    return {answer}
+"""
+LOOP = """
+from pocket.compilation import compiled, compiled_for_session
+from pocket.rule import rule
+@compiled
+def loop():
+    return rule()
+@compiled_for_session
+def own_loop():
+    return rule()
+"""
+SHOW = """
+from pocket.loop import loop, own_loop
+print(loop(), own_loop(), sum(loop.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    folder = tmp_path / "pocket"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "compilation.py").write_text(Path(compilation.__file__).read_text())
+    (folder / "rule.py").write_text(RULE.format(answer=1))
+    (folder / "loop.py").write_text(LOOP)
+    return folder
+
+
+def shown(package, **environment):
+    """(what the loop returns, what the session's loop returns, loops found on disk)."""
+    inherited = {name: v for name, v in os.environ.items() if not name.startswith("NUMBA_")}
+    finished = subprocess.run(
+        [sys.executable, "-c", SHOW],
+        cwd=package.parent,
+        env={**inherited, "PYTHONDONTWRITEBYTECODE": "1", **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return tuple(int(word) for word in finished.stdout.split())
+
+
+def stamp(package):
+    """`source_stamp` of the package, as a fresh process would compute it."""
+    path = package / "compilation.py"
+    spec = importlib.util.spec_from_file_location("pocket_compilation", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.source_stamp()
+
+
+def test_a_cached_loop_is_found_again_and_notices_a_change_in_another_file(package):
+    assert shown(package) == (1, 1, 0)
+    assert shown(package) == (1, 1, 1)
+    (package / "rule.py").write_text(RULE.format(answer=2))
+    assert shown(package) == (2, 2, 0)
+
+
+def test_code_compiled_for_a_session_is_not_kept_on_disk(package, tmp_path):
+    cache = tmp_path / "cache"
+    shown(package, NUMBA_CACHE_DIR=str(cache))
+    kept = {path.name.split("-")[0] for path in cache.rglob("*.nbi")}
+    assert kept == {"loop.loop", "rule.rule"}
+
+
+def test_without_a_folder_for_the_cache_functions_are_compiled_every_time(package, tmp_path):
+    # A plain file where each folder would be: it stops even a user who may write anywhere.
+    (package / "__pycache__").touch()
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    nowhere = {name: str(blocked / "home") for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA")}
+    for _ in range(2):
+        assert shown(package, **nowhere) == (1, 1, 0)
+    assert list(tmp_path.rglob("*.nbi")) == []
+
+
+def edit(package):
+    (package / "rule.py").write_text(RULE.format(answer=2))
+
+
+def add(package):
+    (package / "extra.py").touch()
+
+
+def rename(package):
+    (package / "loop.py").rename(package / "hoop.py")
+
+
+def add_in_a_folder(package):
+    (package / "inner").mkdir()
+    (package / "inner" / "deep.py").touch()
+
+
+@pytest.mark.parametrize("change", [edit, add, rename, add_in_a_folder])
+def test_the_stamp_changes_with_every_source_of_the_package(package, change):
+    before = stamp(package)
+    assert stamp(package) == before
+    change(package)
+    assert stamp(package) != before
+
+
+def test_the_stamp_ignores_files_that_are_not_sources(package):
+    before = stamp(package)
+    (package / "notes.txt").write_text("nothing")
+    assert stamp(package) == before

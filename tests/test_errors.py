@@ -1,0 +1,80 @@
+"""Error messages: what was given, what is known, what is nearest."""
+
+from typing import Annotated
+
+import pytest
+from pydantic import BaseModel, Field, ValidationError
+
+from qbumpers.errors import RequestError, from_validation, unknown_name
+
+
+class Trial(BaseModel):
+    episodes: Annotated[int, Field(ge=1)]
+    share: Annotated[float, Field(le=1)] = 0.5
+
+
+class Plan(BaseModel):
+    trials: list[Trial]
+
+
+def refused(model: type[BaseModel], content: dict) -> str:
+    with pytest.raises(ValidationError) as caught:
+        model.model_validate(content)
+    error = from_validation(caught.value, "plan a.toml")
+    assert isinstance(error, RequestError)
+    return str(error)
+
+
+def test_a_request_error_is_a_value_error():
+    assert issubclass(RequestError, ValueError)
+
+
+def test_an_unknown_name_is_told_with_the_nearest_and_all_known():
+    error = unknown_name("assistant", "maximul", ["none", "maximal"])
+    assert isinstance(error, RequestError)
+    message = str(error)
+    assert message.startswith("unknown assistant 'maximul'")
+    assert "did you mean 'maximal'?" in message
+    assert message.endswith("Known: none, maximal")
+
+
+def test_a_name_like_no_other_gets_no_suggestion():
+    message = str(unknown_name("task", "zzz", ["none", "maximal"]))
+    assert message == "unknown task 'zzz'. Known: none, maximal"
+
+
+def test_names_may_come_from_any_iterable():
+    assert "did you mean 'b1'?" in str(unknown_name("task", "b2", iter(["b1"])))
+
+
+def test_where_nothing_is_known_it_says_so():
+    assert str(unknown_name("option", "alpha", [])).endswith("Known: there are none")
+
+
+def test_a_validation_error_names_the_field_the_value_and_the_bound():
+    message = refused(Trial, {"episodes": 0})
+    assert message.startswith("plan a.toml: episodes = 0: ")
+    assert "greater than or equal to 1" in message
+
+
+def test_every_problem_is_told_at_once():
+    message = refused(Trial, {"episodes": 0, "share": 2.5})
+    assert "episodes = 0: " in message
+    assert "share = 2.5: " in message
+
+
+def test_a_missing_field_has_no_value_to_show():
+    message = refused(Trial, {})
+    assert message.lower() == "plan a.toml: episodes: field required"
+
+
+def test_a_field_inside_others_is_found_by_its_path():
+    message = refused(Plan, {"trials": [{"episodes": 3}, {"episodes": -2}]})
+    assert "trials.1.episodes = -2: " in message
+
+
+def test_a_problem_of_the_whole_has_no_field():
+    with pytest.raises(ValidationError) as caught:
+        Trial.model_validate(7)
+    assert str(from_validation(caught.value, "trial")).startswith("trial: ")
+    assert "trial:  =" not in str(from_validation(caught.value, "trial"))
