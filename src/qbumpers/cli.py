@@ -26,7 +26,7 @@ application = typer.Typer(
 )
 
 Workers = Annotated[
-    int | None, typer.Option(help="Threads to use.", show_default="all cores", metavar="N")
+    int | None, typer.Option(help="Threads to use.", show_default="all cores", metavar="N", min=1)
 ]
 Out = Annotated[
     Path | None,
@@ -171,17 +171,21 @@ def _run(experiment: Any, workers: int | None, out: Path | None) -> None:
         TextColumn("{task.fields[rate]}"),
         TimeRemainingColumn(),
     )
+    bar = Progress(*columns, console=_OUTPUT)
+    total = len(plan.conditions) * experiment.trials
+    task = bar.add_task("simulating", total=total, rate="compiling")
     begun = time.monotonic()
-    with Progress(*columns, console=_OUTPUT) as bar:
-        total = len(plan.conditions) * experiment.trials
-        task = bar.add_task("simulating", total=total, rate="compiling")
 
-        def show(done: Done) -> None:
-            seconds = max(time.monotonic() - begun, 1e-3)
-            rate = f"{done.steps / seconds / 1e6:.1f} million steps a second" if done.steps else ""
-            bar.update(task, completed=done.trials, rate=rate)
+    def show(done: Done) -> None:
+        bar.start()
+        seconds = max(time.monotonic() - begun, 1e-3)
+        rate = f"{done.steps / seconds / 1e6:.1f} million steps a second"
+        bar.update(task, completed=done.trials, rate=rate if done.steps else "compiling")
 
+    try:
         run_experiment(plan, folder, workers=workers, report=show)
+    finally:
+        bar.stop()
     _analyse(folder)
 
 

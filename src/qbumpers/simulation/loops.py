@@ -132,7 +132,7 @@ def _learn(
 
 @register_jitable(**INLINE)
 def _assisted_episode(
-    dynamics, values, own_values, learner, perception, options, memory, streams, width,
+    dynamics, values, gamma, own_values, learner, perception, options, memory, streams, width,
     rates, outcomes, place, counts, record, recorded, script,
 ):  # fmt: skip
     """One training episode; returns the rule's memory and how many steps there are so far."""
@@ -174,7 +174,7 @@ def _assisted_episode(
             _record(record, recorded, place[1], state, step)
         recorded += 1
         earned += discount * reward
-        discount *= dynamics.discount
+        discount *= gamma
         total += reward
         overrides += step.overridden
         events |= event
@@ -212,7 +212,7 @@ def _greedy_episode(dynamics, own_values, stream, width, outcomes, place, counts
 
 @compiled
 def run_trials(
-    dynamics, values, learner, perception, options, streams, width, own_values,
+    dynamics, values, gamma, learner, perception, options, streams, width, own_values,
     outcomes, counts, record, script,
 ):  # fmt: skip
     """Run trials one after another.
@@ -220,6 +220,7 @@ def run_trials(
     Args:
         dynamics: the task.
         values: float64 [S, A], Q* of the assistant.
+        gamma: discount of those values.
         learner: the simulated person.
         perception: what they believe happened.
         options: of the assistant; their type selects its rule.
@@ -254,7 +255,7 @@ def run_trials(
                 scheduled(learner.learning_rate, episode, episodes),
             )
             memory, recorded = _assisted_episode(
-                dynamics, values, own_values, learner, perception, options, memory,
+                dynamics, values, gamma, own_values, learner, perception, options, memory,
                 trial_streams, width, rates, outcomes, (trial, episode),
                 counts, record, recorded, script,
             )  # fmt: skip

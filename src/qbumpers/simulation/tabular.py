@@ -1,5 +1,6 @@
 """Simulated people at tabular tasks: thousands of trials in seconds."""
 
+import hashlib
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from qbumpers.simulation.loops import (
     run_trials_for_session,
 )
 from qbumpers.tasks import TabularTask
-from qbumpers.values import QValues, TabularValues, check_width, solve
+from qbumpers.values import QValues, check_width, solve
 
 
 class Simulation(NamedTuple):
@@ -46,6 +47,7 @@ class Condition(NamedTuple):
     Attributes:
         task: the task.
         values: float64 [S, A], Q* of the assistant.
+        discount: of those values.
         assistant: the assistant.
         learner: the simulated person.
         perception: name of what they believe happened.
@@ -54,6 +56,7 @@ class Condition(NamedTuple):
 
     task: TabularTask
     values: np.ndarray
+    discount: float
     assistant: Assistant
     learner: QLearner
     perception: str
@@ -63,7 +66,8 @@ class Condition(NamedTuple):
         """The condition as JSON-like data: it seeds the random streams and names stored results."""
         return {
             "task": self.task.digest(),
-            "values": TabularValues(self.values, 1.0, "", "").digest(),
+            "values": hashlib.sha256(self.values.tobytes()).hexdigest(),
+            "discount": self.discount,
             "assistant": self.assistant.name,
             "options": self.assistant.options._asdict(),
             "learner": {
@@ -90,7 +94,8 @@ def make_condition(
     Args:
         task: the task.
         assistant: an assistant, or the name of one that needs no options.
-        values: Q* of the assistant; the exact solution where None.
+        values: Q* of the assistant; the exact solution where None. Values that state no discount
+            are taken to have the task's.
         learner: the simulated person; where None, the paper's, with the task's discount.
         perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
         episodes: of a trial, at least 1.
@@ -117,7 +122,13 @@ def make_condition(
     for state in np.flatnonzero(task.start):
         assistant.check_start(float(table[state].max()))
     return Condition(
-        task, table, assistant, learner or QLearner(discount=task.discount), perception, episodes
+        task=task,
+        values=table,
+        discount=float(getattr(source, "discount", task.discount)),
+        assistant=assistant,
+        learner=learner or QLearner(discount=task.discount),
+        perception=perception,
+        episodes=episodes,
     )
 
 
@@ -253,6 +264,7 @@ def _call_loops(
     return loops(
         condition.task.dynamics(),
         condition.values,
+        condition.discount,
         condition.learner,
         named_perception(condition.perception),
         condition.assistant.options,

@@ -23,7 +23,6 @@ class Dynamics(NamedTuple):
         outcomes: K.
         start_states: int64 [N], where episodes start.
         start_cumulative: float64 [N].
-        discount: of the task.
         episode_limit: steps after which an episode is truncated.
     """
 
@@ -35,7 +34,6 @@ class Dynamics(NamedTuple):
     outcomes: int
     start_states: np.ndarray
     start_cumulative: np.ndarray
-    discount: float
     episode_limit: int
 
 

@@ -84,14 +84,12 @@ class TabularTask:
             outcomes=self.next_state.shape[2],
             start_states=starts,
             start_cumulative=_cumulative(self.start[starts]),
-            discount=float(self.discount),
             episode_limit=int(self.episode_limit),
         )
 
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
-        dynamics = self.dynamics()
-        parts = [np.asarray(part).tobytes() for part in dynamics]
+        parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
         return hashlib.sha256(b"|".join(parts)).hexdigest()
 
     @classmethod
