@@ -112,7 +112,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
 
         Raises:
             gymnasium.error.ResetNeeded: before `reset` or after an episode's end.
-            RequestError: for an action outside the action space.
+            RequestError: for an action outside the action space, the person's or the rule's.
         """
         row = self._row
         if row is None:
@@ -131,6 +131,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         situation = Situation(row, proposed, self._earned, self._discount_now, self._start_value)
         decision = self.assistant.decide(situation, noise, self._memory)
         executed = int(decision.action)
+        if not 0 <= executed < self._actions:
+            raise RequestError(f"assistant {self.assistant.name} chose action {executed}")
         observation, reward, terminated, truncated, info = self.env.step(executed + first)
         reward = float(reward)
         credited = _perceive(self.perception, proposed, executed, reward, 0.0).action

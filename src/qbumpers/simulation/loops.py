@@ -14,6 +14,7 @@ from qbumpers.borrowing import borrow, row
 from qbumpers.choice import best_value
 from qbumpers.compilation import INLINE, compiled, compiled_for_session, uncompiled
 from qbumpers.decisions import Noise, Situation, Step, projected_return
+from qbumpers.errors import RequestError
 from qbumpers.learners.perception import Experience, perceive
 from qbumpers.learners.q_learning import QLearner, choose, choose_greedily, learned, scheduled
 from qbumpers.random_streams import ASSISTANT, ENVIRONMENT, EVALUATION, LEARNER, draw
@@ -156,6 +157,8 @@ def _assisted_episode(
         situation = Situation(known, proposed, earned, discount, start_value)
         decision = decide(situation, noise, options, memory)
         executed = int(decision.action)
+        if not 0 <= executed < dynamics.actions:
+            raise RequestError("the assistant's rule chose an action outside the action space")
         index = transition(dynamics, state, executed, _chance(dynamics.outcomes, nature))
         reward, event = dynamics.reward[index], dynamics.events[index]
         next_state = dynamics.next_state[index]
@@ -234,6 +237,9 @@ def run_trials(
 
     Returns:
         Number of assisted steps.
+
+    Raises:
+        RequestError: where the rule chooses an action that there is not.
     """
     trials, episodes = outcomes.assisted_return.shape
     dynamics, values, own_values = borrow(dynamics), borrow(values), borrow(own_values)

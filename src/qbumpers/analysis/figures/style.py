@@ -105,6 +105,7 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
                 folder / f"{name}.{ending}",
                 lambda path, e=ending, m=metadata: drawing.savefig(path, format=e, metadata=m),
             )
+            drawing.set_layout_engine("none")  # the layout stays; finding it takes longest
     return folder / f"{name}.png"
 
 
