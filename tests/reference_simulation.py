@@ -223,7 +223,8 @@ class ReferenceTrial:
                 self.observe(step)
             self.counts["assisted"][state] += 1
             self.counts["overridden"][state] += step.overridden
-            earned, discount = earned + discount * reward, discount * self.task.discount
+            earned = earned + discount * reward
+            discount = discount * self.condition.discount
             total, events, state = total + reward, events | happened, next_state
         steps = self.steps[first_step:]
         return {

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -120,3 +121,15 @@ def test_the_stamp_ignores_files_that_are_not_sources(package):
     before = stamp(package)
     (package / "notes.txt").write_text("nothing")
     assert stamp(package) == before
+
+
+def test_the_stamp_covers_every_source_that_is_compiled(tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(Path(compilation.__file__).parent, copy)
+    marks = ("@compiled", "@register_jitable", "@overload", "@intrinsic")
+    sources = [path for path in copy.rglob("*.py") if any(m in path.read_text() for m in marks)]
+    assert len(sources) > 5
+    for source in sources:
+        before = stamp(copy)
+        source.write_text(source.read_text() + "\n# changed\n")
+        assert stamp(copy) != before, source.name

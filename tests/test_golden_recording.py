@@ -60,7 +60,7 @@ MOVES = [(-1, 0), (0, 1), (1, 0), (0, -1)]
 
 
 def moved(cell, action):
-    """Where a move leads, what it pays and whether it ends the episode, by the rules of the task."""
+    """Where a move leads, what it pays and whether it ends the episode."""
     row = min(max(cell[0] + MOVES[action][0], 0), ROWS - 1)
     column = min(max(cell[1] + MOVES[action][1], 0), COLUMNS_OF_GRID - 1)
     if row == 3 and 0 < column < 11:
@@ -70,7 +70,7 @@ def moved(cell, action):
 
 
 def value(cell):
-    """100 less the steps of the shortest way: right along the cliff, then down at the last column."""
+    """100 less the steps of the shortest way: right above the cliff, down in the last column."""
     up = 1 if cell == START else 0
     row, column = cell[0] - up, cell[1]
     return 100.0 - (up + GOAL[1] - column + GOAL[0] - row)

@@ -4,7 +4,6 @@ import importlib
 import subprocess
 import sys
 
-import gymnasium
 import pytest
 
 import qbumpers
@@ -23,9 +22,11 @@ def test_importing_the_package_loads_nothing_heavy(heavy):
 
 
 def test_importing_the_package_registers_its_environment():
-    program = "import gymnasium, qbumpers; print(gymnasium.make('qbumpers/CliffWalking-v0').spec.id)"
-    assert run(program) == "qbumpers/CliffWalking-v0"
-    assert gymnasium.spec("qbumpers/CliffWalking-v0").max_episode_steps == 100
+    program = (
+        "import gymnasium, qbumpers\n"
+        "print(gymnasium.make('qbumpers/CliffWalking-v0').spec.max_episode_steps)"
+    )
+    assert run(program) == "100"
 
 
 @pytest.mark.parametrize("name", qbumpers.__all__)
@@ -45,6 +46,6 @@ def test_all_public_names_come_with_a_star():
 
 
 def test_an_unknown_name_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="module 'qbumpers' has no attribute 'bumpers'"):
+    with pytest.raises(AttributeError, match=r"qbumpers.*bumpers"):
         qbumpers.bumpers  # noqa: B018 - reading it is the test
     assert not hasattr(qbumpers, "simulator")

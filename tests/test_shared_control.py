@@ -9,8 +9,18 @@ from qbumpers import SharedControl, make_task, register_assistant, solve
 from qbumpers.tasks import TabularEnvironment
 from tests.assistants.own_rules import BudgetOptions, full_budget, guide_within_budget, spend
 from tests.shared_control_examples import (
-    DOWN, LADDER, LEFT, RIGHT, UP, Dial, bumpers, ladder, play, skating, walking,
-)  # fmt: skip
+    DOWN,
+    LADDER,
+    LEFT,
+    RIGHT,
+    UP,
+    Dial,
+    bumpers,
+    ladder,
+    play,
+    skating,
+    walking,
+)
 from tests.tasks.examples import random_task
 
 KEYS = {

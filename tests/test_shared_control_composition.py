@@ -7,8 +7,17 @@ from gymnasium import wrappers
 
 from qbumpers import SharedControl
 from tests.shared_control_examples import (
-    CLIFF, LADDER, LAKE, LEFT, RIGHT, bumpers, ladder, plain, play, walking,
-)  # fmt: skip
+    CLIFF,
+    LADDER,
+    LAKE,
+    LEFT,
+    RIGHT,
+    bumpers,
+    ladder,
+    plain,
+    play,
+    walking,
+)
 
 
 def climbing(inner: gymnasium.Env) -> SharedControl:

@@ -16,17 +16,17 @@ def test_an_action_space_without_numbered_actions_is_refused():
 
 
 def test_an_unknown_assistant_names_the_nearest():
-    with pytest.raises(RequestError, match="assistant 'maximum'.*did you mean 'maximal'"):
+    with pytest.raises(RequestError, match=r"assistant 'maximum'.*did you mean 'maximal'"):
         walking("maximum")
 
 
 def test_an_unknown_option_names_the_nearest():
-    with pytest.raises(RequestError, match="'alhpa'.*did you mean 'alpha'"):
+    with pytest.raises(RequestError, match=r"'alhpa'.*did you mean 'alpha'"):
         walking("stochastic-q-bumpers", alhpa=0.7)
 
 
 def test_a_missing_option_is_named():
-    with pytest.raises(RequestError, match="stochastic-q-bumpers: alpha: .*required"):
+    with pytest.raises(RequestError, match=r"stochastic-q-bumpers: alpha: .*required"):
         walking("stochastic-q-bumpers")
 
 
@@ -42,7 +42,7 @@ def test_options_do_not_go_with_an_assistant_that_has_its_own():
 
 
 def test_an_unknown_perception_names_the_nearest():
-    with pytest.raises(RequestError, match="perception 'observent'.*did you mean 'observant'"):
+    with pytest.raises(RequestError, match=r"perception 'observent'.*did you mean 'observant'"):
         walking("none", perception="observent")
 
 
@@ -85,7 +85,7 @@ def test_values_of_another_width_are_refused_at_reset(row):
 
 def test_values_that_are_not_finite_are_refused_at_reset():
     environment = walking("none", lambda _: [1.0, np.nan, 0.0, 0.0], discount=1.0)
-    with pytest.raises(RequestError, match="Q values at reset are .*nan.*must be finite"):
+    with pytest.raises(RequestError, match=r"Q values at reset are .*nan.*must be finite"):
         environment.reset()
 
 
@@ -94,7 +94,7 @@ def test_values_that_turn_bad_later_are_refused_at_their_step():
     environment = SharedControl(Dial(), "none", lambda _: next(rows), discount=1.0)
     environment.reset()
     environment.step(5)
-    with pytest.raises(RequestError, match="Q values after step 2 are .*inf"):
+    with pytest.raises(RequestError, match=r"Q values after step 2 are .*inf"):
         environment.step(5)
 
 
@@ -164,3 +164,22 @@ def test_a_step_after_the_end_is_refused_until_reset():
         environment.step(5)
     environment.reset()
     assert environment.step(5)[1] == 1.0
+
+
+def test_a_reset_that_failed_starts_no_episode():
+    rows = iter([[1.0, 2.0, 3.0], [np.nan] * 3])
+    environment = SharedControl(Dial(), "none", lambda _: next(rows), discount=1.0)
+    environment.reset()
+    with pytest.raises(RequestError, match="Q values at reset"):
+        environment.reset()
+    with pytest.raises(ResetNeeded):
+        environment.step(5)
+
+
+@pytest.mark.parametrize(
+    "noise", [[0.5, 0.5], [(0.5,)], [(0.5, 0.5, 0.5)], [(1.0, 0.5)], [(0.5, -0.1)], [(np.nan, 0.5)]]
+)
+def test_noise_that_is_no_pairs_of_chances_is_refused(noise):
+    environment = walking("none")
+    with pytest.raises(RequestError, match=r"noise .*\[N, 2\].*\[0, 1\)"):
+        environment.reset(options={"noise": noise})

@@ -46,13 +46,13 @@ def greedy_returns(table: np.ndarray, seed: int) -> list[float]:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_learner_under_wide_bumpers_learns_the_task(seed):
-    # alpha = 1 down to a return of -200 leaves room to fall off twice. In trial runs with six
-    # seeds every greedy episode afterwards was optimal; the two seeds here are fixed.
+    # Room down to a return of -200 is room to fall off twice. With each of six seeds every greedy
+    # episode afterwards was optimal; two of them are kept.
     environment = gymnasium.wrappers.RecordEpisodeStatistics(
         walking(**bumpers(alpha=1.0, v_min=-200.0)), buffer_length=400
     )
     table = train(environment, 400, seed)
-    assert min(environment.return_queue) > -350  # help was there: two falls and a long way
+    assert min(environment.return_queue) >= -200  # help was there: without it, below -1,000
     assert greedy_returns(table, seed) == [87.0] * 20
 
 

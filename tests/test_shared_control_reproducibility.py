@@ -128,9 +128,7 @@ def test_copies_continue_as_the_original_does(make, arguments):
     for action in (3, 0):
         environment.step(action)
     copies = duplicated(environment)
-    going_on = [
-        [plain(e.step(2)), plain(e.step(0)), *session(e)] for e in (environment, *copies)
-    ]
+    going_on = [[plain(e.step(2)), plain(e.step(0)), *session(e)] for e in (environment, *copies)]
     assert going_on[0] == going_on[1] == going_on[2]
 
 
@@ -208,3 +206,9 @@ def test_the_lake_is_skated_under_bumpers():
     returned = session(skating(values=LAKE, **LAKE_BUMPERS), seed=11)
     overridden = [step[-1]["assistance"]["overridden"] for step in returned if len(step) == 5]
     assert {True, False} == set(overridden)
+
+
+def test_recorded_noise_is_for_one_episode():
+    environment = walking("none")
+    play(environment, [3], seed=1, options={"noise": [(0.25, 0.75)] * 50})
+    assert 0.25 not in coins(plain(play(environment, ACTIONS)))

@@ -1,8 +1,8 @@
 """Errors that a user can mend: each names the field, the value and what is allowed."""
 
 import difflib
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -55,3 +55,25 @@ def from_validation(
             message = f"unknown field{_nearest(str(problem['loc'][-1]), known_fields)}"
         problems.append(f"{field}{given}: {message}" if field else message)
     return RequestError(f"{where}: " + "; ".join(problems))
+
+
+def checked(kind: type, fields: Mapping[str, Any], where: str) -> Any:
+    """A NamedTuple of checked numbers.
+
+    Args:
+        kind: the NamedTuple class, its bounds written as `Annotated[float, Field(ge=0, le=1)]`.
+        fields: values by name.
+        where: for messages, for instance "learner".
+
+    Returns:
+        An instance of `kind`, whole numbers turned into floats where its fields are.
+
+    Raises:
+        RequestError: naming each field that is wrong, its value and what is allowed.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_python(dict(fields), strict=True)
+    except ValidationError as error:
+        raise from_validation(error, where) from error

@@ -217,9 +217,11 @@ def test_options_must_be_a_named_tuple_class(options_type):
 
 
 @pytest.mark.usefixtures("own_registry")
-def test_an_options_class_serves_one_rule():
-    with pytest.raises(RequestError, match="'guide' already serves 'maximal'"):
-        register_assistant("guide", MaximalOptions)
+def test_an_options_class_may_serve_several_rules():
+    register_assistant("watch", MaximalOptions)(lambda s, noise, options: Decision(s.proposed, 0.0))
+    watching, maximal = make_assistant("watch"), make_assistant("maximal")
+    assert not watching.decide(SITUATION, NOISE).probability
+    assert maximal.decide(SITUATION, NOISE).probability == 1
 
 
 @pytest.mark.usefixtures("own_registry")

@@ -22,6 +22,8 @@ from tests.assistants.situations import (
     situations,
 )
 
+SECOND, BEST = 1, 2
+
 some_p_max = st.sampled_from([0.999, 0.9, 0.51])
 options_of_any_kind = st.builds(
     StochasticQBumpersOptions,
@@ -135,3 +137,23 @@ def test_coin_below_the_probability_overrides_and_at_it_does_not(proposed):
     below, at = Noise(np.nextafter(probability, 0.0), 0.5), Noise(probability, 0.5)
     assert stochastic_q_bumpers(situation, below, options) == (1, probability)
     assert stochastic_q_bumpers(situation, at, options) == (proposed, probability)
+
+
+@pytest.mark.parametrize(
+    ("candidate", "executed"), [(50.0, BEST), (50.25, SECOND)], ids=["at the value", "above it"]
+)
+def test_escalation_begins_where_the_candidate_only_reaches_the_lower_value(candidate, executed):
+    # The lower value is 100 - 0.5 * 100 = 50.
+    situation = Situation(np.array([40.0, candidate, 60.0]), 0, 0.0, 1.0, 100.0)
+    options = StochasticQBumpersOptions(0.5, second=True)
+    assert stochastic_q_bumpers(situation, Noise(0.9999, 0.5), options) == (executed, 1.0)
+
+
+@pytest.mark.parametrize(("clip", "probability"), [(True, 1.0), (False, 0.999)])
+def test_an_action_that_loses_all_the_room_is_overridden_surely_where_clipped(clip, probability):
+    situation = Situation(np.array([50.0, 60.0, 90.0]), 0, 0.0, 1.0, 100.0)
+    decision = stochastic_q_bumpers(
+        situation, Noise(0.5, 0.5), StochasticQBumpersOptions(0.5, clip=clip)
+    )
+    assert decision.action == BEST
+    assert decision.probability == pytest.approx(probability, abs=PROBABILITY_TOLERANCE)

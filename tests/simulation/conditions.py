@@ -30,7 +30,10 @@ def on_slippery_ice():
 
 
 def in_a_random_world():
-    """Nine states, three actions, three outcomes of each, several starts; values that mislead."""
+    """Nine states, three actions, three outcomes of each, several starts; values that mislead.
+
+    Task, values and learner each have a discount of their own.
+    """
     generator = np.random.default_rng(20190722)
     shape = (9, 3, 3)
     probability = generator.dirichlet(np.ones(3), shape[:2])
@@ -50,7 +53,7 @@ def in_a_random_world():
         success=generator.random(shape) < 0.1,
         crash=generator.random(shape) < 0.1,
     )
-    values = TabularValues(generator.normal(2, 1, (9, 3)), 0.9, task.name, "drawn at random")
+    values = TabularValues(generator.normal(2, 1, (9, 3)), 0.7, task.name, "drawn at random")
     learner = QLearner(
         discount=0.8,
         epsilon=Schedule(0.9, 0.1, 0.5),

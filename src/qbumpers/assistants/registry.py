@@ -1,5 +1,6 @@
 """Decision rules by name: registering one, and making an assistant of a rule and its options."""
 
+import itertools
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numba.core.errors import NumbaError
 
 from qbumpers.compilation import compiled_for_session, uncompiled
 from qbumpers.decisions import Decision, Noise, Situation, Step
-from qbumpers.errors import RequestError, unknown_name
+from qbumpers.errors import RequestError, checked, unknown_name
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,7 @@ class Assistant:
 
 _rules: dict[str, Rule] = {}
 _rules_by_options: dict[type, Rule] = {}
+_registrations = itertools.count()
 
 
 def register_assistant(
@@ -111,8 +113,8 @@ def register_assistant(
 
     Args:
         name: how users will name it.
-        options_type: a NamedTuple class of numbers, a class of its own for each rule. Bounds
-            written as `Annotated[float, Field(ge=0, le=1)]` are checked when an assistant is made.
+        options_type: a NamedTuple class of numbers. Bounds written as
+            `Annotated[float, Field(ge=0, le=1)]` are checked when an assistant is made.
         start: `(options) -> memory`, for a rule that remembers. The rule then takes `memory` as
             its fourth argument.
         observe: `(memory, step, options) -> memory`, called after each step with its `Step`.
@@ -124,8 +126,8 @@ def register_assistant(
         with Numba; where that is impossible it is called as it is, with one warning.
 
     Raises:
-        RequestError: where `options_type` is no NamedTuple class, or serves another rule, or only
-            one of `start` and `observe` is given.
+        RequestError: where `options_type` is no NamedTuple class, or only one of `start` and
+            `observe` is given.
     """
     if not (isinstance(options_type, type) and hasattr(options_type, "_fields")):
         raise RequestError(
@@ -133,11 +135,6 @@ def register_assistant(
         )
     if (start is None) != (observe is None):
         raise RequestError(f"rule {name!r}: give both start and observe, or neither")
-    known = _rules_by_options.get(options_type)
-    if known is not None and known.name != name:
-        raise RequestError(
-            f"options_type of {name!r} already serves {known.name!r}; use a class of its own"
-        )
 
     def decorate(function: Callable[..., Decision]) -> Callable[..., Decision]:
         built_in = isinstance(function, Dispatcher) and function.__module__.startswith("qbumpers.")
@@ -160,9 +157,11 @@ def _user_rule(
     observe: Callable[..., Any] | None,
     check_start: Callable[[Any, float], None] | None,
 ) -> Rule:
-    # A fresh class for each registration: compiled code is selected by the type of the options,
-    # and a rule registered again (an edited notebook cell) must not meet its old code.
-    fresh = type(options_type.__name__, (options_type,), {"__slots__": ()})
+    # A fresh class for each registration, with a fresh name: compiled code is selected by the type
+    # of the options, which Numba tells apart by name, and a rule registered again (an edited
+    # notebook cell) must not meet its old code.
+    fresh_name = f"{options_type.__name__}_{next(_registrations)}"
+    fresh = type(fresh_name, (options_type,), {"__slots__": ()})
     plain = (function, start, observe)
     compiled: list[Any] = [
         f if f is None or isinstance(f, Dispatcher) else compiled_for_session(f) for f in plain
@@ -242,15 +241,8 @@ def _unpickled(name: str, options: dict[str, Any]) -> Assistant:
 
 
 def _checked(rule: Rule, options: dict[str, Any]) -> Any:
-    from pydantic import TypeAdapter, ValidationError
-
-    from qbumpers.errors import from_validation
-
     fields: tuple[str, ...] = rule.options_type._fields  # type: ignore[attr-defined]
     for option in options:
         if option not in fields:
             raise unknown_name(f"option of assistant {rule.name}:", option, fields)
-    try:
-        return TypeAdapter(rule.options_type).validate_python(options, strict=True)
-    except ValidationError as error:
-        raise from_validation(error, f"assistant {rule.name}") from error
+    return checked(rule.options_type, options, f"assistant {rule.name}")

@@ -35,11 +35,11 @@ class QLearner(NamedTuple):
             includes disruption.
     """
 
-    discount: float = 1.0
+    discount: Annotated[float, Field(gt=0, le=1)] = 1.0
     epsilon: Schedule = Schedule()
     learning_rate: Schedule = Schedule()
-    initial_value: float = 0.0
-    penalty: float = 1.0
+    initial_value: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
 
 
 @compiled

@@ -1,17 +1,18 @@
 """Simulated people at tabular tasks: thousands of trials in seconds."""
 
-import hashlib
+import itertools
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.assistants import Assistant
 from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners import QLearner
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import trial_streams
+from qbumpers.simulation.condition import Condition, make_condition
 from qbumpers.simulation.loops import (
     Outcomes,
     Script,
@@ -21,7 +22,7 @@ from qbumpers.simulation.loops import (
     run_trials_for_session,
 )
 from qbumpers.tasks import TabularTask
-from qbumpers.values import QValues, check_width, solve
+from qbumpers.values import QValues
 
 
 class Simulation(NamedTuple):
@@ -39,97 +40,6 @@ class Simulation(NamedTuple):
     def steps(self) -> int:
         """Steps that the learners took, with help and without."""
         return int(self.outcomes.assisted_length.sum() + self.outcomes.unassisted_length.sum())
-
-
-class Condition(NamedTuple):
-    """What a trial needs: everything but the seed and the number of the trial.
-
-    Attributes:
-        task: the task.
-        values: float64 [S, A], Q* of the assistant.
-        discount: of those values.
-        assistant: the assistant.
-        learner: the simulated person.
-        perception: name of what they believe happened.
-        episodes: E, assisted episodes of a trial, each followed by a greedy one without help.
-    """
-
-    task: TabularTask
-    values: np.ndarray
-    discount: float
-    assistant: Assistant
-    learner: QLearner
-    perception: str
-    episodes: int
-
-    def content(self) -> dict[str, Any]:
-        """The condition as JSON-like data: it seeds the random streams and names stored results."""
-        return {
-            "task": self.task.digest(),
-            "values": hashlib.sha256(self.values.tobytes()).hexdigest(),
-            "discount": self.discount,
-            "assistant": self.assistant.name,
-            "options": self.assistant.options._asdict(),
-            "learner": {
-                **self.learner._asdict(),
-                "epsilon": self.learner.epsilon._asdict(),
-                "learning_rate": self.learner.learning_rate._asdict(),
-            },
-            "perception": self.perception,
-            "episodes": self.episodes,
-        }
-
-
-def make_condition(
-    task: TabularTask,
-    assistant: Assistant | str,
-    *,
-    values: QValues | None = None,
-    learner: QLearner | None = None,
-    perception: str = "transition",
-    episodes: int = 100,
-) -> Condition:
-    """Check everything that a simulation needs, before any of it runs.
-
-    Args:
-        task: the task.
-        assistant: an assistant, or the name of one that needs no options.
-        values: Q* of the assistant; the exact solution where None. Values that state no discount
-            are taken to have the task's.
-        learner: the simulated person; where None, the paper's, with the task's discount.
-        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
-        episodes: of a trial, at least 1.
-
-    Returns:
-        The condition.
-
-    Raises:
-        RequestError: where a name is unknown, a number is out of range, the values do not fit the
-            task, or an episode could start where the assistant's options do not suit it.
-    """
-    if episodes < 1:
-        raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")
-    if isinstance(assistant, str):
-        assistant = make_assistant(assistant)
-    named_perception(perception)
-    source = solve(task) if values is None else values
-    table = np.stack(
-        [
-            check_width(source(state), task.actions, f"in state {state}")
-            for state in range(task.states)
-        ]
-    )
-    for state in np.flatnonzero(task.start):
-        assistant.check_start(float(table[state].max()))
-    return Condition(
-        task=task,
-        values=table,
-        discount=float(getattr(source, "discount", task.discount)),
-        assistant=assistant,
-        learner=learner or QLearner(discount=task.discount),
-        perception=perception,
-        episodes=episodes,
-    )
 
 
 def simulate(
@@ -177,9 +87,11 @@ def run(
     condition: Condition, *, trials: int | range, seed: int = 0, workers: int = 1
 ) -> Simulation:
     """Simulate a condition; `simulate` says what the arguments mean."""
-    trials = _checked_trials(trials, seed)
-    parts = np.array_split(np.asarray(trials), min(workers, len(trials)))
-    ranges = [range(int(part[0]), int(part[-1]) + 1) for part in parts]
+    which = _checked_trials(trials, seed)
+    if workers < 1:
+        raise RequestError(f"workers = {workers!r}; at least 1 is needed")
+    ends = np.linspace(0, len(which), min(workers, len(which)) + 1).astype(int).tolist()
+    ranges = [which[first:last] for first, last in itertools.pairwise(ends)]
     if len(ranges) == 1:
         simulations = [_run_block(condition, ranges[0], seed)]
     else:
@@ -206,7 +118,12 @@ def record(
 
     Returns:
         Step records, arrays [N].
+
+    Raises:
+        RequestError: where the trial, the seed or the script is out of range.
     """
+    if script is not None:
+        _check_script(script, condition.task.actions)
     room = condition.episodes * condition.task.episode_limit
     steps = Steps(
         episode=np.zeros(room, np.int64),
@@ -228,12 +145,26 @@ def record(
 
 
 def _checked_trials(trials: int | range, seed: int) -> range:
-    if seed < 0:
-        raise RequestError(f"seed = {seed!r}; it must not be negative")
+    if not isinstance(seed, int) or seed < 0:
+        raise RequestError(f"seed = {seed!r}; a whole number, not negative, is needed")
     which = range(trials) if isinstance(trials, int) else trials
-    if len(which) < 1:
-        raise RequestError(f"trials = {trials!r}; at least 1 is needed")
+    if not isinstance(which, range) or len(which) < 1 or min(which) < 0:
+        raise RequestError(f"trials = {trials!r}; at least 1, or a range from 0 up, is needed")
     return which
+
+
+def _check_script(script: Script, actions: int) -> None:
+    lengths = {len(part) for part in script}
+    if len(lengths) != 1:
+        raise RequestError(
+            f"script: its parts have lengths {sorted(lengths)}; one length is needed"
+        )
+    proposed = np.asarray(script.proposed)
+    if len(proposed) and not 0 <= proposed.min() <= proposed.max() < actions:
+        raise RequestError(f"script: proposed actions must lie in [0, {actions})")
+    noise = np.concatenate([script.coin, script.tie])
+    if not ((noise >= 0) & (noise < 1)).all():
+        raise RequestError("script: coin and tie must lie in [0, 1)")
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:

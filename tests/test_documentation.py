@@ -1,0 +1,243 @@
+"""Every command and every Python block of the documentation is run; every link leads somewhere.
+
+How pages are written, so that they can be run:
+
+- The blocks of a page run in order, in one process and one empty folder. Python blocks share names.
+- A `text` block after a `python` or `sh` block is what that prints; `...` stands for anything. A
+  Python block without one prints nothing, and warns of nothing.
+- A `toml` block whose first line is `# NAME.toml` is written to that file, for a command to use.
+- Other languages (`bibtex`, or none) are not looked at.
+"""
+
+import doctest
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from PIL import Image
+
+import qbumpers
+from qbumpers.cli import application
+from qbumpers.experiments.design import load_experiment
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = {
+    str(path.relative_to(ROOT)): path
+    for path in [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
+}
+RUN_LANGUAGES = ("python", "sh", "toml", "text")
+CITED_HOSTS = {"doi.org", "arxiv.org"}
+
+_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_LINK = re.compile(r"\]\(([^)\s]+)\)|(?:src|href)=\"([^\"]+)\"")
+_NAMED_TOML = re.compile(r"# (\S+\.toml)\n")
+_MARK = "--- next block ---"
+_PREAMBLE = f"""
+import subprocess, sys, warnings
+from pathlib import Path
+
+def show_warning(message, category, *_):
+    print(f"{{category.__name__}}: {{message}}")
+
+def next_block():
+    print({_MARK!r}, flush=True)
+
+def run(*command):
+    subprocess.run([sys.executable, "-m", *command], check=True, stderr=subprocess.STDOUT)
+
+warnings.showwarning = show_warning
+"""
+
+
+class Block(NamedTuple):
+    language: str
+    text: str
+
+
+def blocks_of(page):
+    return [Block(*found) for found in _FENCE.findall(page.read_text(encoding="utf-8"))]
+
+
+def prose_of(page):
+    return _FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
+def commands_of(blocks):
+    lines = [line for b in blocks if b.language == "sh" for line in b.text.splitlines()]
+    return [shlex.split(line, comments=True) for line in lines if line.strip()]
+
+
+def is_run(command):
+    """Whether a command is run here; the others are checked by tests of their own."""
+    return command[0] == "qbumpers"
+
+
+def script_of(blocks):
+    """The blocks of a page as one Python script that says where each begins."""
+    parts = [_PREAMBLE]
+    for block in blocks:
+        parts.append("next_block()")
+        if block.language == "python":
+            parts.append(block.text)
+        elif block.language == "sh":
+            parts += [f"run(*{c!r})" for c in commands_of([block]) if is_run(c)]
+        elif named := _NAMED_TOML.match(block.text):
+            parts.append(f"Path({named[1]!r}).write_text({block.text!r}, encoding='utf-8')")
+    return "\n".join(parts)
+
+
+def printed_by(blocks, folder):
+    """What each block of a page prints."""
+    script = folder / "page.py"
+    script.write_text(script_of(blocks), encoding="utf-8")
+    working = folder / "working"
+    working.mkdir()
+    environment = {**os.environ, "MPLBACKEND": "Agg", "COLUMNS": "110", "PYTHONIOENCODING": "utf-8"}
+    finished = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=working, env=environment, capture_output=True, text=True, encoding="utf-8",
+    )  # fmt: skip
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    return finished.stdout.split(_MARK + "\n")[1:]
+
+
+@pytest.mark.parametrize("name", [n for n, p in PAGES.items() if "```" in p.read_text("utf-8")])
+def test_what_a_page_shows_runs_and_prints_what_it_says(name, tmp_path):
+    blocks = [block for block in blocks_of(PAGES[name]) if block.language in RUN_LANGUAGES]
+    outputs = printed_by(blocks, tmp_path)
+    assert len(outputs) == len(blocks)
+    following = [*blocks[1:], Block("", "")]
+    for block, after, printed in zip(blocks, following, outputs, strict=True):
+        if block.language == "python" or (block.language == "sh" and after.language == "text"):
+            expected = after.text if after.language == "text" else ""
+            flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+            assert doctest.OutputChecker().check_output(expected, printed, flags), (
+                f"{name}: after\n{block.text}\nis shown\n{expected}\nbut it prints\n{printed}"
+            )
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_fences_of_a_page_are_paired_and_of_known_languages(name):
+    text = PAGES[name].read_text(encoding="utf-8")
+    assert "```" not in prose_of(PAGES[name]).replace("```text`", "")
+    languages = {block.language for block in blocks_of(PAGES[name])}
+    assert languages <= {*RUN_LANGUAGES, "bibtex", ""}
+    assert text.endswith("\n")
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_shown_command_is_one_that_these_tests_know(name):
+    for command in commands_of(blocks_of(PAGES[name])):
+        program, *arguments = command
+        if program == "make":
+            targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+            assert set(arguments) <= set(targets)
+        elif program == "pip":
+            assert arguments[:2] == ["install", "-e"]
+            assert re.fullmatch(r"\.(\[\w+\])?", arguments[2])
+            extra = re.findall(r"\w+", arguments[2])
+            project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+            assert set(extra) <= set(project["project"]["optional-dependencies"])
+        elif program == "python":
+            assert (ROOT / arguments[0]).is_file()
+        else:
+            assert is_run(command), f"{name}: {command} is run by no test"
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_named_experiment_file_is_valid_and_used(name, tmp_path):
+    blocks = blocks_of(PAGES[name])
+    used = {argument for command in commands_of(blocks) for argument in command}
+    for block in blocks:
+        if block.language != "toml":
+            continue
+        tomllib.loads(block.text)
+        if named := _NAMED_TOML.match(block.text):
+            assert named[1] in used
+            (tmp_path / named[1]).write_text(block.text, encoding="utf-8")
+            load_experiment(tmp_path / named[1])
+
+
+def anchors_of(page):
+    """Anchors of a page's headings, as Python-Markdown makes them."""
+    headings = re.findall(r"^#+ (.+)$", prose_of(page), re.MULTILINE)
+    plain = [re.sub(r"[^\w\s-]", "", heading).strip().lower() for heading in headings]
+    return {re.sub(r"[-\s]+", "-", heading) for heading in plain}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_links_and_pictures_of_a_page_exist(name):
+    page = PAGES[name]
+    for found in _LINK.findall(prose_of(page)):
+        target, _, anchor = (found[0] or found[1]).partition("#")
+        if target.startswith("https://"):
+            continue
+        path = (page.parent / target).resolve() if target else page
+        assert path.is_file(), f"{name}: {target}"
+        if anchor:
+            assert anchor in anchors_of(path), f"{name}: {target}#{anchor}"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        path
+        for path in [*PAGES.values(), ROOT / "mkdocs.yml", *sorted(DOCS.rglob("*"))]
+        if path.suffix in {".md", ".yml", ".css", ".py", ".j2"}
+    ],
+    ids=lambda path: str(path.relative_to(ROOT)),
+)
+def test_no_page_names_a_host_but_those_of_citations(path):
+    hosts = re.findall(r"(?:https?:)?//([\w-]+(?:\.[\w-]+)+)", path.read_text(encoding="utf-8"))
+    assert set(hosts) <= CITED_HOSTS
+
+
+def test_every_public_name_is_in_the_reference():
+    pages = sorted((DOCS / "reference").glob("*.md"))
+    documented = {n for p in pages for n in re.findall(r"^::: (\S+)", p.read_text(), re.MULTILINE)}
+    for name in set(qbumpers.__all__) - {"__version__"}:
+        module = getattr(qbumpers, name).__module__
+        assert documented & {module, f"{module}.{name}"}, f"{name} of {module}"
+
+
+def test_every_command_is_shown_somewhere():
+    shown = {c[1] for p in PAGES.values() for c in commands_of(blocks_of(p)) if is_run(c)}
+    registered = {c.name or c.callback.__name__ for c in application.registered_commands}
+    assert registered <= shown
+
+
+def test_pictures_are_small_enough_for_a_repository():
+    pictures = sorted((DOCS / "images").glob("*.png"))
+    assert pictures
+    for path in pictures:
+        assert path.stat().st_size < 120_000, path.name
+        with Image.open(path) as picture:
+            assert picture.width <= 1600, path.name
+
+
+def make(script, folder):
+    subprocess.run([sys.executable, str(DOCS / script), str(folder)], check=True)
+    return {path.name for path in (folder / "images").iterdir()}
+
+
+@pytest.mark.slow
+def test_the_reproduction_page_says_what_its_script_finds(tmp_path):
+    """The committed page, pictures aside, is exactly what the script writes."""
+    pictures = make("make_reproduction.py", tmp_path)
+    fresh = (tmp_path / "reproduction.md").read_text(encoding="utf-8")
+    assert (DOCS / "reproduction.md").read_text(encoding="utf-8") == fresh
+    assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
+
+
+@pytest.mark.slow
+def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
+    pictures = make("make_pictures.py", tmp_path)
+    assert pictures
+    assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
