@@ -84,6 +84,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._first_action = int(env.action_space.start)
         self._generator = np.random.Generator(np.random.SFC64())
         self._noise: list[list[float]] = []
+        self._recorded: list[list[float]] = []
         self._memory = self.assistant.start()
         self._row: np.ndarray | None = None
 
@@ -95,8 +96,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         if seed is not None:
             self._generator = np.random.Generator(np.random.SFC64([seed, *b"SharedControl"]))
             self._noise = []
-        if "noise" in options:
-            self._noise = np.flip(np.asarray(options.pop("noise"), np.float64), 0).tolist()
+        self._recorded = _checked_noise(options.pop("noise", ()))
+        self._row = None
         observation, info = self.env.reset(seed=seed, options=options or None)
         row = check_width(self.values(observation), self._actions, "at reset")
         self._start_value = float(row.max())
@@ -127,7 +128,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             )
         if not self._noise:
             self._noise = self._generator.random((_NOISE_DRAWN, 2)).tolist()
-        noise = Noise(*self._noise.pop())
+        noise = Noise(*(self._recorded or self._noise).pop())
         situation = Situation(row, proposed, self._earned, self._discount_now, self._start_value)
         decision = self.assistant.decide(situation, noise, self._memory)
         executed = int(decision.action)
@@ -168,6 +169,19 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             "start_value": self._start_value,
             "projected_return": last.projected_return,
         }
+
+
+def _checked_noise(noise: Any) -> list[list[float]]:
+    """Recorded noise, the last decision's first."""
+    pairs = np.asarray(noise, np.float64)
+    if not pairs.size:
+        return []
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not ((pairs >= 0) & (pairs < 1)).all():
+        raise RequestError(
+            f"noise has shape {pairs.shape}; pairs (coin, tie), [N, 2], of numbers in [0, 1) are "
+            "needed"
+        )
+    return pairs[::-1].tolist()
 
 
 def _discount_of(values: Any, discount: float | None) -> float:

@@ -2,8 +2,10 @@
 
 import gymnasium
 import numpy as np
+import pytest
 from gymnasium.utils.env_checker import check_env
 
+from qbumpers import RequestError
 from qbumpers.tasks import TabularEnvironment, TabularTask, make_task
 from tests.tasks.examples import outcomes, random_task
 
@@ -84,3 +86,11 @@ def test_equal_seeds_give_equal_episodes_and_others_do_not():
 
     assert walk(3) == walk(3)
     assert len({tuple(walk(seed)) for seed in range(5)}) > 1
+
+
+@pytest.mark.parametrize("action", [-1, 3])
+def test_an_action_that_does_not_exist_is_refused(action):
+    environment = TabularEnvironment(random_task(1, 5, 3))
+    environment.reset(seed=0)
+    with pytest.raises(RequestError, match=rf"action = {action}; it must lie in \[0, 3\)"):
+        environment.step(action)

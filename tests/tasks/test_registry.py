@@ -30,9 +30,9 @@ def test_gymnasium_environments_are_made_with_their_arguments():
 
 
 def test_an_unknown_task_names_the_nearest_one():
-    with pytest.raises(RequestError, match="'cliff-wlaking'.*did you mean 'cliff-walking'"):
+    with pytest.raises(RequestError, match=r"'cliff-wlaking'.*did you mean 'cliff-walking'"):
         make_task("cliff-wlaking")
-    with pytest.raises(RequestError, match="'FrozenLake'.*did you mean 'FrozenLake-v1'"):
+    with pytest.raises(RequestError, match=r"'FrozenLake'.*did you mean 'FrozenLake-v1'"):
         make_task("FrozenLake")
 
 
@@ -48,8 +48,10 @@ def test_a_gymnasium_environment_needs_a_discount():
 
 
 def test_a_wrong_argument_of_an_environment_is_named():
-    with pytest.raises(RequestError, match="'FrozenLake-v1': .*'wetness'"):
+    with pytest.raises(RequestError, match=r"'FrozenLake-v1': .*'wetness'"):
         make_task("FrozenLake-v1", discount=0.9, wetness=3)
+    with pytest.raises(RequestError, match=r"'FrozenLake-v1': .*'5x5'"):
+        make_task("FrozenLake-v1", discount=0.9, map_name="5x5")
 
 
 def test_an_environment_without_a_table_is_refused():

@@ -1,4 +1,4 @@
-"""Tabular tasks from arrays and tables: what they mean, what is refused, what their digest covers."""
+"""Tabular tasks from arrays and tables: their meaning, what is refused, what the digest covers."""
 
 import dataclasses
 
@@ -129,6 +129,8 @@ def test_given_judges_decide_alone():
         ({"terminal": [False]}, r"terminal has shape \(1,\)"),
         ({"success": [False] * 3}, r"success has shape \(3,\)"),
         ({"crash": [[False, True]]}, r"crash has shape \(1, 2\)"),
+        ({"start": 2}, r"start = 2; it must lie in \[0, 2\)"),
+        ({"start": -1}, r"start = -1; it must lie in \[0, 2\)"),
         ({"start": [1.0]}, r"task two: start has shape \(1,\)"),
         ({"start": [0.5, 0.4]}, r"task two: start sums to 0\.9"),
         ({"discount": 0}, "task two: discount = 0;"),
@@ -146,6 +148,12 @@ def test_wrong_arrays_are_refused_by_name(changes, message):
 def test_a_wrong_row_of_a_table_is_refused_with_its_state_and_action():
     table = {**TABLE, 1: {0: [(0.5, 0, 0.0, False)], 1: TABLE[1][1]}}
     with pytest.raises(RequestError, match=r"\(state, action\) = \(1, 0\) sums to 0\.5"):
+        from_table(table)
+
+
+@pytest.mark.parametrize("table", [{}, {**TABLE, 1: {0: TABLE[1][0]}}, {0: TABLE[0], 5: TABLE[1]}])
+def test_a_table_with_gaps_is_refused(table):
+    with pytest.raises(RequestError, match=r"table\b.*states 0, 1, .* actions"):
         from_table(table)
 
 
@@ -178,8 +186,11 @@ def test_the_digest_is_that_of_the_behaviour():
     "changes",
     [
         {"transition": TRANSITION[:, ::-1]},
-        {"transition": TRANSITION * [[[0.8], [1]], [[1], [1]]] + [[[0, 0.2], [0, 0]], [[0, 0]] * 2]},
-        {"reward": REWARD + [[0, 0], [0, 1e-9]]},
+        {
+            "transition": TRANSITION * [[[0.8], [1]], [[1], [1]]]
+            + [[[0, 0.2], [0, 0]], [[0, 0]] * 2]
+        },
+        {"reward": [[1.0, 2.0], [3.0, 4.0 + 1e-9]]},
         {"terminal": [False, False]},
         {"start": 1},
         {"start": [0.5, 0.5]},

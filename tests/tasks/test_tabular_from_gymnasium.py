@@ -116,3 +116,8 @@ def test_an_environment_without_a_start_is_refused():
 def test_a_discount_out_of_range_is_refused():
     with pytest.raises(RequestError, match=r"FrozenLake-v1: discount = 1\.5"):
         TabularTask.from_gymnasium(made("slippery"), discount=1.5)
+
+
+def test_a_limit_below_1_is_refused():
+    with pytest.raises(RequestError, match="FrozenLake-v1: episode_limit = 0; at least 1"):
+        TabularTask.from_gymnasium(made("slippery"), discount=0.9, episode_limit=0)

@@ -51,6 +51,13 @@ def test_a_truncated_episode_is_not_an_end():
     np.testing.assert_allclose(learn_values(task, episodes=2000).table, 2.0, atol=1e-9)
 
 
+def test_nothing_comes_after_the_end():
+    # The goal's own values stay at the 7 they began with and must not be added to its reward.
+    learner = QLearner(initial_value=7.0)
+    values = learn_values(chain(3, -1.0, 10.0, 1.0), learner=learner)
+    np.testing.assert_allclose(values.table[:, 0], [8.0, 9.0, 10.0, 7.0], rtol=0, atol=1e-9)
+
+
 def test_pairs_never_visited_keep_the_initial_value():
     learner = QLearner(initial_value=7.0)
     values = learn_values(cliff_walking(), episodes=50, learner=learner)

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 from gymnasium import spaces
 
+from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, transition
 from qbumpers.tasks.tabular import TabularTask
 
@@ -44,6 +45,8 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
             Next state, reward, terminated, False, and `info`.
         """
         dynamics = self._dynamics
+        if not 0 <= action < dynamics.actions:
+            raise RequestError(f"action = {action!r}; it must lie in [0, {dynamics.actions})")
         index = transition(dynamics, self._state, int(action), self.np_random.random())
         self._state = int(dynamics.next_state[index])
         events = int(dynamics.events[index])

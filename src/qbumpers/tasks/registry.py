@@ -57,7 +57,7 @@ def make_task(
         )
     try:
         environment = gymnasium.make(name, disable_env_checker=True, **arguments)
-    except (TypeError, gymnasium.error.Error, ImportError) as error:
+    except (TypeError, ValueError, LookupError, gymnasium.error.Error, ImportError) as error:
         raise RequestError(f"task {name!r}: {error}") from error
     task = TabularTask.from_gymnasium(environment, discount=discount, episode_limit=episode_limit)
     environment.close()

@@ -145,8 +145,9 @@ class TabularTask:
             )
         distribution = np.asarray(start, np.float64)
         if np.ndim(start) == 0:
-            distribution = np.zeros(states)
-            distribution[int(np.asarray(start))] = 1
+            if start not in range(states):
+                raise RequestError(f"start = {start!r}; it must lie in [0, {states})")
+            distribution = np.eye(states)[int(np.asarray(start))]
         return cls(
             name=name,
             next_state=order,
@@ -193,7 +194,11 @@ class TabularTask:
         Raises:
             RequestError: as the class does.
         """
-        states, actions = len(table), len(table[0])
+        states, actions = len(table), len(table.get(0, ()))
+        if any(set(table.get(s, ())) != set(range(actions)) for s in range(states)) or not actions:
+            raise RequestError(
+                "table must have states 0, 1, ... and in each the same actions 0, 1, ..."
+            )
         outcomes = max(len(table[s][a]) for s in range(states) for a in range(actions))
         shape = (states, actions, outcomes)
         probability, next_state = np.zeros(shape), np.zeros(shape, np.int64)
@@ -259,8 +264,10 @@ class TabularTask:
                 f"environment {name} has no attribute {missing}: a tabular task needs its "
                 "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
             )
-        limit = episode_limit or (environment.spec and environment.spec.max_episode_steps)
-        if not limit:
+        limit = episode_limit
+        if limit is None and environment.spec:
+            limit = environment.spec.max_episode_steps
+        if limit is None:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         grid = np.shape(inner.desc) if np.ndim(getattr(inner, "desc", 0)) == 2 else None
         if grid is not None and int(np.prod(grid)) != len(table):

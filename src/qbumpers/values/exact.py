@@ -1,5 +1,7 @@
 """Exact Q* of a tabular task by dynamic programming."""
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse.linalg
 from scipy import sparse
@@ -11,16 +13,14 @@ from qbumpers.values.tabular import TabularValues
 DECIMALS = 9
 """Values are rounded so: actions that are equally good in truth must not differ by round-off."""
 
-_SWEEPS = 200_000
-_CHANGE = 1e-12  # relative, at which undiscounted value iteration has converged
-
 
 def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
     """Q* of a task, exact up to rounding to nine decimals.
 
-    Discounted: policy iteration, each policy evaluated by a linear solve. Undiscounted: value
-    iteration, after a check that every state that an episode can reach has a proper policy, one
-    that ends the episode with probability 1. Truncation by the step limit plays no part.
+    Policy iteration, each policy evaluated by a linear solve. Undiscounted, it starts from a
+    proper policy, one that ends the episode with probability 1, after a check that every state
+    that an episode can reach has one; the values are those of the best proper policy. Truncation
+    by the step limit plays no part.
 
     Args:
         task: the task.
@@ -36,7 +36,11 @@ def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
     discount = task.discount if discount is None else discount
     if not 0 < discount <= 1:
         raise RequestError(f"discount = {discount!r}; it must lie in (0, 1]")
-    table = _policy_iteration(task, discount) if discount < 1 else _value_iteration(task)
+    table = (
+        _policy_iteration(task, np.zeros(task.states, np.int64), discount)
+        if discount < 1
+        else _undiscounted(task)
+    )
     return TabularValues(
         table=np.round(table, DECIMALS) + 0.0,  # + 0.0 turns -0.0 into 0.0
         discount=discount,
@@ -60,9 +64,8 @@ def backup(task: TabularTask, state_values: np.ndarray, discount: float) -> np.n
     return (task.probability * (task.reward + discount * future)).sum(axis=2)
 
 
-def _policy_iteration(task: TabularTask, discount: float) -> np.ndarray:
+def _policy_iteration(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndarray:
     states = np.arange(task.states)
-    policy = np.zeros(task.states, np.int64)
     while True:
         table = backup(task, _evaluate(task, policy, discount), discount)
         best = table.max(axis=1)
@@ -70,6 +73,12 @@ def _policy_iteration(task: TabularTask, discount: float) -> np.ndarray:
         if kept.all():
             return table
         policy = np.where(kept, policy, table.argmax(axis=1))
+        # Improving a proper policy makes one that never ends only where a cycle pays.
+        if discount == 1 and not _leading_to_the_end(task, _only(policy, task.actions))[0].all():
+            raise RequestError(
+                f"task {task.name}: reward can be collected for ever, so its undiscounted values "
+                "do not exist; give a discount below 1"
+            )
 
 
 def _evaluate(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndarray:
@@ -89,7 +98,7 @@ def _evaluate(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndar
     return np.asarray(scipy.sparse.linalg.spsolve(system, reward))
 
 
-def _value_iteration(task: TabularTask) -> np.ndarray:
+def _undiscounted(task: TabularTask) -> np.ndarray:
     proper = proper_states(task)
     stranded = np.flatnonzero(reachable_states(task) & ~proper)
     if len(stranded):
@@ -97,18 +106,30 @@ def _value_iteration(task: TabularTask) -> np.ndarray:
             f"task {task.name}: from state {stranded[0]} no policy ends the episode with "
             "probability 1, so its undiscounted values do not exist; give a discount below 1"
         )
-    state_values = np.zeros(task.states)
-    for _ in range(_SWEEPS):
-        table = np.where(proper[:, None], backup(task, state_values, 1.0), 0.0)
-        fresh = table.max(axis=1)
-        change = np.abs(fresh - state_values).max()
-        state_values = fresh
-        if change <= _CHANGE * max(1.0, np.abs(fresh).max()):
-            return table
-    raise RequestError(
-        f"task {task.name}: undiscounted values did not settle in {_SWEEPS:,} sweeps, as where "
-        "reward can be collected for ever; give a discount below 1"
-    )
+    # No episode gets to the other states: worth 0, as if they ended it.
+    ended = task.terminated | ~proper[task.next_state] | ~proper[:, None, None]
+    closed = replace(task, terminated=ended)
+    allowed = np.ones((task.states, task.actions), np.bool_)
+    policy = _leading_to_the_end(closed, allowed)[1]
+    return np.where(proper[:, None], _policy_iteration(closed, policy, 1.0), 0.0)
+
+
+def _leading_to_the_end(task: TabularTask, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States that can reach the end by allowed actions [S, A], and for each an action nearer it."""
+    possible = (task.probability > 0) & allowed[:, :, None]
+    ends = np.zeros(task.states, np.bool_)
+    policy = np.zeros(task.states, np.int64)
+    while True:
+        leads = np.any(possible & (task.terminated | ends[task.next_state]), axis=2)
+        fresh = np.any(leads, axis=1) & ~ends
+        if not fresh.any():
+            return ends, policy
+        policy[fresh] = leads.argmax(axis=1)[fresh]
+        ends |= fresh
+
+
+def _only(policy: np.ndarray, actions: int) -> np.ndarray:
+    return policy[:, None] == np.arange(actions)
 
 
 def reachable_states(task: TabularTask) -> np.ndarray:

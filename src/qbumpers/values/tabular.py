@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import os
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -13,6 +14,12 @@ import numpy as np
 
 import qbumpers
 from qbumpers.errors import RequestError
+
+# What NumPy and the archive's reader raise at a file of another kind, or with a byte changed.
+_DAMAGE = (
+    OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, RuntimeError, BadZipFile,
+    zlib.error,
+)  # fmt: skip
 
 
 class QValues(Protocol):
@@ -109,14 +116,15 @@ def load_values(path: str | Path) -> TabularValues:
         RequestError: where the file is missing, is no such file, or was changed since.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            table = file["table"]
-            provenance = json.loads(str(file["provenance"]))
+        # Opened here: NumPy leaves the file open where it is no archive.
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            table = archive["table"]
+            provenance = json.loads(str(archive["provenance"]))
         expected = provenance.pop("sha256")
         values = TabularValues(table=table, **provenance)
     except FileNotFoundError as error:
         raise RequestError(f"values file {path}: there is none") from error
-    except (OSError, KeyError, TypeError, ValueError, BadZipFile, EOFError) as error:
+    except _DAMAGE as error:
         raise RequestError(f"values file {path}: not a file of Q values ({error})") from error
     if values.digest() != expected:
         raise RequestError(
