@@ -16,7 +16,7 @@ import plain_python
 from measuring import Row, Target, Timed, alternate, compared, is_quick, seconds_of, show
 
 from qbumpers.assistants import Assistant, make_assistant
-from qbumpers.simulation import Condition, Simulation, make_condition, run
+from qbumpers.simulation import Condition, make_condition, run
 from qbumpers.tasks import cliff_walking
 
 ASSISTANTS = {
@@ -140,7 +140,7 @@ def by_assistant(rounds: int) -> list[Row]:
 def _rate(condition: Condition) -> Timed:
     def timed(seed: int) -> float:
         begin = time.process_time()
-        simulation: Simulation = run(condition, trials=_TRIALS, seed=seed)
+        simulation = run(condition, trials=_TRIALS, seed=seed)
         return simulation.steps / (time.process_time() - begin) / 1e6
 
     return timed
@@ -153,8 +153,8 @@ def two_workers(rounds: int) -> Row:
 
     def rate(workers: int) -> Timed:
         def timed(_: int) -> float:
-            work = lambda: run(condition, trials=_THREADED_TRIALS, workers=workers)  # noqa: E731
-            return steps / seconds_of(work) / 1e6
+            seconds = seconds_of(lambda: run(condition, trials=_THREADED_TRIALS, workers=workers))
+            return steps / seconds / 1e6
 
         return timed
 

@@ -1,6 +1,6 @@
 """Train a learner that knows nothing of assistants inside shared control: Stable-Baselines3's DQN.
 
-Needs the extra `sb3`: `pip install "qbumpers[sb3]"`. Takes about twenty seconds.
+Needs the extra `sb3` (in a checkout, `pip install -e ".[sb3]"`). Takes about twenty seconds.
 """
 
 import gymnasium

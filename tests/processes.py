@@ -1,29 +1,33 @@
 """The command line as its users start it: a process of its own."""
 
 import os
-import signal
 import subprocess
 import sys
 
 # Wide, so that tables and messages are not broken into lines; plain, so that they are text.
 ENVIRONMENT = {**os.environ, "COLUMNS": "200", "TERM": "dumb", "NO_COLOR": "1"}
 
+# `python -m qbumpers` that hears Ctrl-C even where it is started by a background job, which does
+# not, and that can be forbidden to write large files.
+PROGRAM = """
+import runpy, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+largest = int(sys.argv.pop(1))
+if largest:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+runpy.run_module("qbumpers", run_name="__main__", alter_sys=True)
+"""
 
-def start(*arguments, prepare=lambda: None):
-    """Start the command in its own process; `prepare` runs there before Python does."""
 
-    def ready():
-        # A shell's background job ignores Ctrl-C, and so would every process that it starts.
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        prepare()
-
+def start(*arguments, largest_file=0):
+    """Start the command in its own process; `largest_file` is in bytes, 0 for any."""
     return subprocess.Popen(
-        [sys.executable, "-m", "qbumpers", *map(str, arguments)],
+        [sys.executable, "-c", PROGRAM, str(largest_file), *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=ENVIRONMENT,
-        preexec_fn=ready,
     )
 
 
@@ -36,5 +40,5 @@ def finish(process):
     return process.returncode, output, errors
 
 
-def call(*arguments, prepare=lambda: None):
-    return finish(start(*arguments, prepare=prepare))
+def call(*arguments, largest_file=0):
+    return finish(start(*arguments, largest_file=largest_file))
