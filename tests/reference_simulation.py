@@ -99,7 +99,8 @@ def seeded_bit_generators(seed, content, trial):
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     digest = hashlib.sha256(text.encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 32, 4)]
-    state = np.random.SeedSequence([seed, *words, trial]).generate_state(12, np.uint64)
+    philox = np.random.Philox(np.random.SeedSequence([seed, *words]))
+    state = philox.random_raw(12 * (trial + 1))[-12:]  # drawn one after another up to this trial
     return [np.random.SFC64(_Words(state[first : first + 3])) for first in (0, 3, 6, 9)]
 
 

@@ -7,6 +7,8 @@ How pages are written, so that they can be run:
   Python block without one prints nothing, and warns of nothing.
 - A `toml` block whose first line is `# NAME.toml` is written to that file, for a command to use.
 - Other languages (`bibtex`, or none) are not looked at.
+
+`python -m tests.test_documentation` writes what is printed now into the `text` blocks.
 """
 
 import doctest
@@ -15,6 +17,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 import tomllib
 from pathlib import Path
 from typing import NamedTuple
@@ -32,7 +35,9 @@ PAGES = {
     str(path.relative_to(ROOT)): path
     for path in [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md"))]
 }
-RUN_LANGUAGES = ("python", "sh", "toml", "text")
+RUNNING = ("python", "sh")
+RUN_LANGUAGES = (*RUNNING, "toml", "text")
+INTERNAL = ("assistants.dispatch", "borrowing", "cli", "compilation", "errors", "files")
 CITED_HOSTS = {"doi.org", "arxiv.org"}
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -108,25 +113,32 @@ def printed_by(blocks, folder):
     return finished.stdout.split(_MARK + "\n")[1:]
 
 
+def shown_and_printed(page, folder):
+    """For each block that runs: the `text` block after it or None, itself, and what it prints."""
+    found = [m for m in _FENCE.finditer(page.read_text("utf-8")) if m[1] in RUN_LANGUAGES]
+    outputs = printed_by([Block(*m.groups()) for m in found], folder)
+    return [
+        (after if after and after[1] == "text" else None, block, printed)
+        for block, after, printed in zip(found, [*found, None][1:], outputs, strict=True)
+        if block[1] in RUNNING
+    ]
+
+
 @pytest.mark.parametrize("name", [n for n, p in PAGES.items() if "```" in p.read_text("utf-8")])
 def test_what_a_page_shows_runs_and_prints_what_it_says(name, tmp_path):
-    blocks = [block for block in blocks_of(PAGES[name]) if block.language in RUN_LANGUAGES]
-    outputs = printed_by(blocks, tmp_path)
-    assert len(outputs) == len(blocks)
-    following = [*blocks[1:], Block("", "")]
-    for block, after, printed in zip(blocks, following, outputs, strict=True):
-        if block.language == "python" or (block.language == "sh" and after.language == "text"):
-            expected = after.text if after.language == "text" else ""
-            flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    for shown, block, printed in shown_and_printed(PAGES[name], tmp_path):
+        if shown or block[1] == "python":
+            expected = shown[2] if shown else ""
             assert doctest.OutputChecker().check_output(expected, printed, flags), (
-                f"{name}: after\n{block.text}\nis shown\n{expected}\nbut it prints\n{printed}"
+                f"{name}: after\n{block[2]}\nis shown\n{expected}\nbut it prints\n{printed}"
             )
 
 
 @pytest.mark.parametrize("name", PAGES)
 def test_the_fences_of_a_page_are_paired_and_of_known_languages(name):
     text = PAGES[name].read_text(encoding="utf-8")
-    assert "```" not in prose_of(PAGES[name]).replace("```text`", "")
+    assert "```" not in prose_of(PAGES[name])
     languages = {block.language for block in blocks_of(PAGES[name])}
     assert languages <= {*RUN_LANGUAGES, "bibtex", ""}
     assert text.endswith("\n")
@@ -154,13 +166,12 @@ def test_every_shown_command_is_one_that_these_tests_know(name):
 @pytest.mark.parametrize("name", PAGES)
 def test_every_named_experiment_file_is_valid_and_used(name, tmp_path):
     blocks = blocks_of(PAGES[name])
-    used = {argument for command in commands_of(blocks) for argument in command}
     for block in blocks:
         if block.language != "toml":
             continue
         tomllib.loads(block.text)
         if named := _NAMED_TOML.match(block.text):
-            assert named[1] in used
+            assert any(named[1] in other.text for other in blocks if other.language in RUNNING)
             (tmp_path / named[1]).write_text(block.text, encoding="utf-8")
             load_experiment(tmp_path / named[1])
 
@@ -199,12 +210,26 @@ def test_no_page_names_a_host_but_those_of_citations(path):
     assert set(hosts) <= CITED_HOSTS
 
 
-def test_every_public_name_is_in_the_reference():
+def documented():
+    """What the reference describes: modules, or names of modules."""
     pages = sorted((DOCS / "reference").glob("*.md"))
-    documented = {n for p in pages for n in re.findall(r"^::: (\S+)", p.read_text(), re.MULTILINE)}
+    return {n for p in pages for n in re.findall(r"^::: (\S+)", p.read_text("utf-8"), re.MULTILINE)}
+
+
+def test_every_public_name_is_in_the_reference():
     for name in set(qbumpers.__all__) - {"__version__"}:
         module = getattr(qbumpers, name).__module__
-        assert documented & {module, f"{module}.{name}"}, f"{name} of {module}"
+        assert documented() & {module, f"{module}.{name}"}, f"{name} of {module}"
+
+
+def test_the_reference_has_every_module_that_is_not_internal():
+    modules = {
+        ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+        for path in (ROOT / "src" / "qbumpers").rglob("*.py")
+        if not path.name.startswith("__")
+    }
+    missing = modules - documented() - {f"qbumpers.{name}" for name in INTERNAL}
+    assert missing == set()
 
 
 def test_every_command_is_shown_somewhere():
@@ -219,7 +244,7 @@ def test_pictures_are_small_enough_for_a_repository():
     for path in pictures:
         assert path.stat().st_size < 120_000, path.name
         with Image.open(path) as picture:
-            assert picture.width <= 1600, path.name
+            assert picture.width <= 1700, path.name
 
 
 def make(script, folder):
@@ -241,3 +266,19 @@ def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
     pictures = make("make_pictures.py", tmp_path)
     assert pictures
     assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
+
+
+def rewrite(page):
+    """Write what blocks print into the `text` blocks after them, but where those have `...`."""
+    text = page.read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        for shown, _, printed in reversed(shown_and_printed(page, Path(folder))):
+            if shown and "..." not in shown[2]:
+                lines = [line.rstrip() + "\n" for line in printed.splitlines()]
+                text = text[: shown.start(2)] + "".join(lines) + text[shown.end(2) :]
+    page.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    for one in PAGES.values():
+        rewrite(one)

@@ -1,13 +1,16 @@
 """The command line. Exit status: 0 done, 1 it failed, 2 the request was wrong."""
 
+import contextlib
 import math
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
@@ -63,7 +66,8 @@ def reproduce(
     """
     from qbumpers.experiments.design import reproduction
 
-    _run(reproduction(experiment, profile, trials=trials, seed=seed), workers, out)
+    with _stoppable():
+        _run(reproduction(experiment, profile, trials=trials, seed=seed), workers, out)
 
 
 @application.command()
@@ -82,7 +86,8 @@ def run(
     """
     from qbumpers.experiments.design import load_experiment
 
-    _run(load_experiment(experiment), workers, out)
+    with _stoppable():
+        _run(load_experiment(experiment), workers, out)
 
 
 @application.command()
@@ -90,7 +95,8 @@ def report(
     folder: Annotated[Path, typer.Argument(help="Results of a finished run.", metavar="DIR")],
 ) -> None:
     """Write tables, figures and report.html of a finished run again."""
-    _analyse(folder)
+    with _stoppable():
+        _analyse(folder)
 
 
 @application.command("list")
@@ -162,7 +168,7 @@ def _run(experiment: Any, workers: int | None, out: Path | None) -> None:
     folder = out or Path("results") / experiment.name
     _OUTPUT.print(
         f"[bold]{experiment.name}[/bold]: {len(plan.conditions)} conditions, {experiment.trials} "
-        f"trials of {experiment.episodes} episodes, into {folder}"
+        f"trials of {experiment.episodes} episodes, into {escape(str(folder))}"
     )
     columns = (
         TextColumn("{task.description}"),
@@ -203,7 +209,7 @@ def _analyse(folder: Path) -> None:
             f"At matched {matched}, regret is {100 * r.mean:.0f}% lower "
             f"(95% interval {100 * r.low:.0f}% to {100 * r.high:.0f}%)."
         )
-    _OUTPUT.print(f"Report: [bold]{folder / REPORT}[/bold]")
+    _OUTPUT.print(f"Report: [bold]{escape(str(folder / REPORT))}[/bold]", soft_wrap=True)
 
 
 def _summary_table(summary: Any) -> Table:
@@ -253,8 +259,6 @@ def main() -> None:
         application()
     except RequestError as error:
         _stop(2, "error", str(error))
-    except KeyboardInterrupt:
-        _stop(1, "stopped", "what is finished is kept; the same command goes on from there")
     except OSError as error:
         _stop(1, "failed", f"{error}; what is finished is kept")
     except Exception as error:
@@ -262,6 +266,15 @@ def main() -> None:
             raise
         reason = f"{type(error).__name__}: {error}"
         _stop(1, "failed", f"{reason} (unexpected; 'qbumpers --traceback ...' shows where)")
+
+
+@contextlib.contextmanager
+def _stoppable() -> Iterator[None]:
+    """End on Ctrl-C with a message; Typer by itself would end without one."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _stop(1, "stopped", "what is finished is kept; the same command goes on from there")
 
 
 def _stop(status: int, kind: str, message: str) -> None:

@@ -1,8 +1,9 @@
 """Random streams: who draws what, seeded so that order and number of workers change nothing.
 
-A trial owns four independent streams, one for each source of chance. They are NumPy's SFC64
-generators, stepped in compiled code; `numpy.random.SFC64` given the same seed words draws the same
-numbers.
+A condition has a counter-based generator, NumPy's Philox, seeded by the experiment's seed and the
+condition's content; the number of a trial is a place in its sequence. What stands there seeds the
+trial's four independent streams, one for each source of chance: NumPy's SFC64 generators, stepped
+in compiled code.
 """
 
 import hashlib
@@ -18,6 +19,7 @@ LEARNER, ASSISTANT, ENVIRONMENT, EVALUATION = range(4)
 
 _STREAMS = 4
 _SEED_WORDS = 3
+_BLOCKS = _STREAMS * _SEED_WORDS // 4  # of Philox a trial, each of four 64-bit words
 _ONE = np.uint64(1)
 _SHIFT_3, _SHIFT_11 = np.uint64(3), np.uint64(11)
 _SHIFT_24, _SHIFT_40 = np.uint64(24), np.uint64(40)
@@ -48,12 +50,12 @@ def trial_streams(seed: int, content: Any, trials: range) -> np.ndarray:
     Returns:
         uint64 [T, 4, 4]: for each trial and source of chance, the state of an SFC64 generator.
     """
-    words = content_words(content)
-    seeds = np.empty((len(trials), _STREAMS, _SEED_WORDS), np.uint64)
-    for row, trial in enumerate(trials):
-        sequence = np.random.SeedSequence([seed, *words, trial])
-        seeds[row] = sequence.generate_state(seeds[row].size, np.uint64).reshape(seeds[row].shape)
-    return _warmed(seeds)
+    if trials.step != 1:
+        return np.concatenate([trial_streams(seed, content, range(t, t + 1)) for t in trials])
+    source = np.random.Philox(np.random.SeedSequence([seed, *content_words(content)]))
+    source.advance(trials.start * _BLOCKS)
+    seeds = source.random_raw(len(trials) * _STREAMS * _SEED_WORDS)
+    return _warmed(seeds.reshape(len(trials), _STREAMS, _SEED_WORDS))
 
 
 @compiled

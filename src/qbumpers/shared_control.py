@@ -20,7 +20,7 @@ RECORD, SUMMARY = "assistance", "assisted_episode"
 
 _NOISE_DRAWN = 256  # decisions for which noise is drawn at a time
 
-_perceive = uncompiled(perceive)
+_perceive, _projected_return = uncompiled(perceive), uncompiled(projected_return)
 
 
 class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -105,8 +105,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._row = row
         self._earned, self._discount_now, self._total = 0.0, 1.0, 0.0
         self._length, self._overrides = 0, 0
-        record = (-1, -1, -1, False, 0.0, 0.0, 0.0, row.copy(), self._start_value, 0.0)
-        return observation, {**info, RECORD: dict(zip(Step._fields, record, strict=True))}
+        record = Step(-1, -1, -1, False, 0.0, 0.0, 0.0, row.copy(), self._start_value, 0.0)
+        return observation, {**info, RECORD: record._asdict()}
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
@@ -140,10 +140,10 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         record = Step(
             proposed + first, executed + first, credited + first if credited >= 0 else -1,
             executed != proposed, float(decision.probability), noise.coin, noise.tie, row.copy(),
-            projected_return(self._earned, self._discount_now, row[proposed]), reward,
+            _projected_return(self._earned, self._discount_now, row[proposed]), reward,
         )  # fmt: skip
         self._count(record, executed != proposed, reward)
-        info = {**info, RECORD: dict(zip(Step._fields, record, strict=True))}
+        info = {**info, RECORD: record._asdict()}
         if terminated or truncated:
             self._row = None
             info[SUMMARY] = self._summary(record)

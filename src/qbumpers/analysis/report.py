@@ -22,7 +22,8 @@ from qbumpers.analysis.section_4_1 import (
     suboptimal_moves,
     threshold_story,
 )
-from qbumpers.experiments.store import Results, load, run_description, write_atomically
+from qbumpers.experiments.store import Results, load, run_description
+from qbumpers.files import write_atomically
 
 REPORT, SUMMARY, REGRET, PUBLISHED = (
     "report.html",

@@ -11,7 +11,7 @@ import polars as pl
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.store import Cell, Store, digest
+from qbumpers.experiments.store import Cell, digest, open_store
 from qbumpers.simulation import Condition, Simulation, make_condition
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import TabularTask, make_task
@@ -122,22 +122,25 @@ def run_experiment(
         report: called with the progress after each cell, from the calling thread.
 
     Raises:
-        RequestError: where the folder holds another experiment or `workers` is below 1.
+        RequestError: where the folder holds another experiment, another run is writing to it, or
+            `workers` is below 1.
         StoreError: where results cannot be written; finished cells stay.
     """
     if workers is not None and workers < 1:
         raise RequestError(f"workers = {workers!r}; at least 1 is needed")
-    store = Store(folder, plan.experiment)
-    store.write_values(plan.values)
-    missing = [cell for cell in plan.cells if not store.finished(cell)]
-    total = sum(cell.trials for cell in plan.cells)
-    progress = Progress(total - sum(cell.trials for cell in missing), total, 0)
-    report(progress)
-    for cell, simulation in _simulated(plan, missing, workers or os.cpu_count() or 1):
-        store.write(cell, episode_table(plan, cell, simulation), state_table(plan.task, simulation))
-        progress = Progress(progress.trials + cell.trials, total, progress.steps + simulation.steps)
+    with open_store(folder, plan.experiment) as store:
+        store.write_values(plan.values)
+        missing = [cell for cell in plan.cells if not store.finished(cell)]
+        total = sum(cell.trials for cell in plan.cells)
+        progress = Progress(total - sum(cell.trials for cell in missing), total, 0)
         report(progress)
-    store.assemble(plan.cells)
+        for cell, simulation in _simulated(plan, missing, workers or os.cpu_count() or 1):
+            tables = episode_table(plan, cell, simulation), state_table(plan.task, simulation)
+            store.write(cell, *tables)
+            done, steps = progress.trials + cell.trials, progress.steps + simulation.steps
+            progress = Progress(done, total, steps)
+            report(progress)
+        store.assemble(plan.cells)
 
 
 def _simulated(plan: Plan, cells: list[Cell], workers: int) -> Iterator[tuple[Cell, Simulation]]:

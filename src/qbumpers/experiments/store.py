@@ -2,20 +2,22 @@
 
 import contextlib
 import hashlib
+import io
 import json
-import os
 import platform
 import tomllib
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import filelock
 import polars as pl
 import tomli_w
 
 import qbumpers
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment, load_experiment
+from qbumpers.files import LEFT_BEHIND, StoreError, write_atomically
 from qbumpers.values import TabularValues, load_values
 
 EXPERIMENT, EPISODES, STATES, VALUES = (
@@ -27,10 +29,6 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
 """Files of an output folder; design and platform, a row an episode, a row a state, Q*."""
 
 _GROWING = {"trials", "assistants"}  # an experiment may be continued with more of these
-
-
-class StoreError(OSError):
-    """Results could not be written or read; what was finished before stays."""
 
 
 class Cell(NamedTuple):
@@ -65,63 +63,27 @@ class Results(NamedTuple):
     values: TabularValues
 
 
-def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write a file so that it appears whole or not at all.
-
-    Args:
-        path: of the file.
-        write: writes it at the path that it is given.
-
-    Raises:
-        StoreError: where it cannot be written, for instance on a full disk.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(temporary)
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except (OSError, pl.exceptions.ComputeError) as error:
-        raise StoreError(
-            f"cannot write {path}: {getattr(error, 'strerror', None) or error}"
-        ) from error
-    finally:
-        with contextlib.suppress(OSError):  # an unwritable folder: nothing was left there
-            temporary.unlink(missing_ok=True)
-
-
 def digest(content: Any) -> str:
     """A SHA-256 of JSON-like data, in hexadecimal."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 class Store:
-    """The output folder of one experiment.
+    """The output folder of one experiment; `open_store` opens it.
 
     Args:
-        folder: of the results; made where it is missing.
-        experiment: to be run, or continued.
-
-    Raises:
-        RequestError: where the folder holds another experiment, or is no folder.
-        StoreError: where it cannot be written.
+        folder: of the results.
     """
 
-    def __init__(self, folder: str | Path, experiment: Experiment) -> None:
-        self.folder = Path(folder)
-        if self.folder.exists() and not self.folder.is_dir():
-            raise RequestError(f"output folder {folder}: it is a file")
-        _check_same(self.folder, experiment)
-        write_atomically(
-            self.folder / EXPERIMENT, lambda path: path.write_text(_described(experiment))
-        )
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
 
     def finished(self, cell: Cell) -> bool:
         """Whether a cell is there and whole."""
         try:
             for kind in (EPISODES, STATES):
-                pl.read_parquet_schema(self._path(cell, kind))
+                with self._path(cell, kind).open("rb") as file:
+                    pl.read_parquet_schema(file)
         except (OSError, pl.exceptions.PolarsError):
             return False
         return True
@@ -129,17 +91,17 @@ class Store:
     def write(self, cell: Cell, episodes: pl.DataFrame, states: pl.DataFrame) -> None:
         """Keep the results of a cell; the file of episodes, written last, says that it is whole."""
         for kind, frame in ((STATES, states), (EPISODES, episodes)):
-            write_atomically(self._path(cell, kind), frame.write_parquet)
+            _write_table(self._path(cell, kind), frame)
 
     def write_values(self, values: TabularValues) -> None:
         """Keep the assistants' Q*."""
-        write_atomically(self.folder / VALUES, values.save)
+        values.save(self.folder / VALUES)
 
     def assemble(self, cells: list[Cell]) -> None:
         """Write the tables of the whole experiment from its finished cells."""
         for kind in (EPISODES, STATES):
             parts = [
-                pl.read_parquet(self._path(cell, kind)).select(
+                pl.read_parquet(self._path(cell, kind), glob=False).select(
                     pl.lit(cell.condition).alias("condition"), pl.all()
                 )
                 for cell in cells
@@ -148,10 +110,56 @@ class Store:
             if kind == STATES:
                 keys = ["condition", "state", "row", "column"]
                 table = table.group_by(keys, maintain_order=True).sum()
-            write_atomically(self.folder / kind, table.write_parquet)
+            _write_table(self.folder / kind, table)
 
     def _path(self, cell: Cell, kind: str) -> Path:
         return self.folder / "cells" / cell.content[:16] / f"{cell.first:06d}-{cell.trials}-{kind}"
+
+
+def _write_table(path: Path, table: pl.DataFrame) -> None:
+    # Through memory: Polars' own message about a full disk does not say so.
+    buffer = io.BytesIO()
+    table.write_parquet(buffer)
+    write_atomically(path, lambda temporary: temporary.write_bytes(buffer.getvalue()))
+
+
+@contextlib.contextmanager
+def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
+    """Open an output folder for one run, which alone writes to it.
+
+    Args:
+        folder: of the results; made where it is missing.
+        experiment: to be run, or continued.
+
+    Yields:
+        The store, with what a killed run left half-written cleared away.
+
+    Raises:
+        RequestError: where the folder is a file, holds another experiment, or another run is
+            writing to it.
+        StoreError: where it cannot be written.
+    """
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise RequestError(f"output folder {folder}: it is a file")
+    _check_same(folder, experiment)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = filelock.FileLock(folder / ".lock").acquire(timeout=0)
+    except filelock.Timeout as error:
+        raise RequestError(
+            f"output folder {folder}: another run is writing to it; wait for it, or choose another "
+            "folder"
+        ) from error
+    except OSError as error:
+        raise StoreError(
+            f"cannot write {folder / EXPERIMENT}: {error.strerror or error}"
+        ) from error
+    with lock:
+        write_atomically(folder / EXPERIMENT, lambda path: path.write_text(_described(experiment)))
+        for left in folder.rglob(LEFT_BEHIND):
+            left.unlink(missing_ok=True)
+        yield Store(folder)
 
 
 def load(folder: str | Path) -> Results:
@@ -169,18 +177,25 @@ def load(folder: str | Path) -> Results:
     folder = Path(folder)
     if not (folder / EXPERIMENT).is_file():
         raise RequestError(f"results folder {folder}: it holds no {EXPERIMENT}")
+    experiment = load_experiment(folder / EXPERIMENT)
     if not (folder / EPISODES).is_file():
-        raise RequestError(
-            f"results folder {folder}: the run is not finished; run it again to continue"
-        )
+        raise _unfinished(folder)
     try:
-        episodes, states = pl.read_parquet(folder / EPISODES), pl.read_parquet(folder / STATES)
+        episodes, states = (pl.read_parquet(folder / f, glob=False) for f in (EPISODES, STATES))
     except (OSError, pl.exceptions.PolarsError) as error:
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
-    return Results(
-        load_experiment(folder / EXPERIMENT), episodes, states, load_values(folder / VALUES)
+    conditions = {named.condition for named in experiment.named_assistants()}
+    rows = len(conditions) * experiment.trials * experiment.episodes
+    if episodes.height != rows or set(episodes["condition"].unique()) != conditions:
+        raise _unfinished(folder)
+    return Results(experiment, episodes, states, load_values(folder / VALUES))
+
+
+def _unfinished(folder: Path) -> RequestError:
+    return RequestError(
+        f"results folder {folder}: the run is not finished; run it again to continue"
     )
 
 

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 import qbumpers
 from qbumpers.errors import RequestError
+from qbumpers.files import write_atomically
 
 # What NumPy and the archive's reader raise at a file of another kind, or with a byte changed.
 _DAMAGE = (
@@ -85,8 +85,10 @@ class TabularValues:
 
         Args:
             path: of the file.
+
+        Raises:
+            StoreError: where it cannot be written.
         """
-        path = Path(path)
         provenance = {
             "task": self.task,
             "method": self.method,
@@ -94,13 +96,12 @@ class TabularValues:
             "version": self.version,
             "sha256": self.digest(),
         }
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-        try:
+
+        def write(temporary: Path) -> None:
             with temporary.open("wb") as file:
                 np.savez_compressed(file, table=self.table, provenance=json.dumps(provenance))
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
+
+        write_atomically(Path(path), write)
 
 
 def load_values(path: str | Path) -> TabularValues:

@@ -25,6 +25,8 @@ def representative(summary: pl.DataFrame, each: int = 2) -> list[str]:
     """
     chosen = []
     overriding = summary.filter((pl.col("overrides_mean") > 0) | (pl.col("assistant") == "none"))
+    if overriding.is_empty():
+        overriding = summary
     for part in overriding.partition_by("assistant", maintain_order=True):
         places = np.linspace(0, part.height - 1, min(each, part.height)).round().astype(int)
         chosen += [str(part["condition"][int(place)]) for place in places]

@@ -32,11 +32,10 @@ def frontier_figure(summary: pl.DataFrame, published: Sequence[Mapping[str, Any]
     Returns:
         The figure.
     """
-    overriding = summary.filter(
-        (pl.col("overrides_mean") > 0) & pl.col("alpha").is_not_null()
-        if "alpha" in summary.columns
-        else pl.col("overrides_mean") > 0
-    )
+    overriding = summary.filter(pl.col("overrides_mean") > 0)
+    swept = overriding.filter(pl.col("condition").str.contains("/", literal=True))
+    if swept.height:
+        overriding = swept
     cluster = tightest_cluster(overriding)
     with figure(10, 10.5 if overriding.height else 5) as drawing:
         if not overriding.height:
@@ -98,6 +97,13 @@ def _draw_published(axes: Axes, rows: pl.DataFrame, published: Sequence[Mapping[
             )  # fmt: skip
 
 
+def _label(row: Mapping[str, Any]) -> str:
+    """What tells a condition from others of its assistant."""
+    if row.get("alpha") is not None:
+        return f"α = {row['alpha']:g}"
+    return str(row["condition"]).partition("/")[2]
+
+
 def _main(
     axes: Axes,
     rows: pl.DataFrame,
@@ -108,9 +114,9 @@ def _main(
     _draw_published(axes, rows, published)
     clustered = set(cluster["condition"]) if cluster.height else set()
     for row in rows.iter_rows(named=True):
-        if row["condition"] not in clustered and row.get("alpha") is not None:
+        if row["condition"] not in clustered:
             axes.annotate(
-                f"α = {row['alpha']:g}", (row["assisted_mean"], row["unassisted_mean"]),
+                _label(row), (row["assisted_mean"], row["unassisted_mean"]),
                 xytext=(7, 7), textcoords="offset points", fontsize=9,
                 color=colour(row["assistant"]),
             )  # fmt: skip
@@ -144,7 +150,7 @@ def _cluster(axes: Axes, rows: pl.DataFrame, published: Sequence[Mapping[str, An
     low, high = points[:, 0].min(), points[:, 0].max()
     room = max(high - low, 1e-9)
     axes.set_xlim(low - 0.9 * room, high + 1.5 * room)
-    labels = [f"α = {alpha:g}" for alpha in rows["alpha"]]
+    labels = [_label(row) for row in rows.iter_rows(named=True)]
     label_in_column(axes, points, labels, at=0.82, ink=colour(name))
     title = f"{NAMES.get(name, name)}, enlarged"
     axes.set(xlabel=_AXES[0], ylabel=_AXES[1], title=title)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qbumpers.experiments.store import write_atomically
+from qbumpers.files import write_atomically
 
 NAMES = {
     "none": "No assistance",

@@ -1,0 +1,25 @@
+"""Run every benchmark and print one table: `python benchmarks/run.py [--quick]`."""
+
+import os
+import platform
+
+import shared_control
+import simulation
+import whole_processes
+from measuring import is_quick, show
+
+
+def main() -> None:
+    quick = is_quick(__doc__)
+    load = os.getloadavg()[0]
+    rows = [
+        row
+        for benchmark in (simulation, shared_control, whole_processes)
+        for row in benchmark.measure(quick)
+    ]
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} when begun"
+    show(f"Medians of alternated rounds ({machine})", rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Small experiments that the tests of experiments, analysis and command line run."""
+
+from pathlib import Path
+
+import polars as pl
+import tomli_w
+
+from qbumpers.experiments.design import make_experiment
+from qbumpers.experiments.run import make_plan, run_experiment
+
+BUMPERS = {"name": "stochastic-q-bumpers", "alpha": [0.3, 0.7], "second": True}
+
+LAKE = {
+    "name": "lake",
+    "task": {"name": "FrozenLake-v1", "discount": 0.9, "arguments": {"is_slippery": False}},
+    "assistants": [{"name": "none"}, {**BUMPERS, "v_min": -1.0}],
+}
+
+# Without a grid, so that its report is made quickly.
+PLAIN = {
+    "name": "plain",
+    "task": {"name": "CliffWalking-v1", "discount": 0.9, "episode_limit": 30},
+    "assistants": [{"name": "none"}, {**BUMPERS, "v_min": -50.0}],
+}
+
+
+def settings(**changes):
+    return {
+        "name": "small",
+        "task": "cliff-walking",
+        "trials": 5,
+        "episodes": 4,
+        "seed": 3,
+        "assistants": [{"name": "none"}, BUMPERS],
+        **changes,
+    }
+
+
+def run_into(folder, *, workers=1, report=lambda progress: None, **changes):
+    plan = make_plan(make_experiment(settings(**changes)))
+    run_experiment(plan, folder, workers=workers, report=report)
+    return Path(folder)
+
+
+def rows_of(folder):
+    """Every row of an experiment by condition, trial and episode."""
+    table = pl.read_parquet(Path(folder) / "episodes.parquet", glob=False)
+    keys = ("condition", "trial", "episode")
+    return {
+        tuple(row[key] for key in keys): tuple(row.values()) for row in table.iter_rows(named=True)
+    }
+
+
+def cells_of(folder):
+    return sorted((Path(folder) / "cells").rglob("*.parquet"))
+
+
+def contents_of(folder, *patterns):
+    """What files hold, by name, but for the lock."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for pattern in patterns
+        for path in sorted(Path(folder).glob(pattern))
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+def write_toml(path, **changes):
+    path.write_text(tomli_w.dumps(settings(**changes)), encoding="utf-8")
+    return path
