@@ -140,7 +140,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         record = Step(
             proposed + first, executed + first, credited + first if credited >= 0 else -1,
             executed != proposed, float(decision.probability), noise.coin, noise.tie, row.copy(),
-            _projected_return(self._earned, self._discount_now, row[proposed]), reward,
+            _projected_return(self._earned, self._discount_now, float(row[proposed])), reward,
         )  # fmt: skip
         self._count(record, executed != proposed, reward)
         info = {**info, RECORD: record._asdict()}
