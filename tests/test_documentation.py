@@ -232,6 +232,18 @@ def test_the_reference_has_every_module_that_is_not_internal():
     assert missing == set()
 
 
+def test_the_contributors_page_shows_the_layers_and_the_folders_that_there_are():
+    page = (DOCS / "contributing.md").read_text(encoding="utf-8")
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    layers = settings["tool"]["importlinter"]["contracts"][0]["layers"]
+    assert "\n".join(layer.replace("qbumpers.", "") for layer in layers) in page
+    for path in (ROOT / "src" / "qbumpers").iterdir():
+        if path.suffix == ".py" and not path.name.startswith("__"):
+            assert f"  {path.name} " in page
+        elif (path / "__init__.py").is_file():
+            assert f"  {path.name}/ " in page
+
+
 def test_every_command_is_shown_somewhere():
     shown = {c[1] for p in PAGES.values() for c in commands_of(blocks_of(p)) if is_run(c)}
     registered = {c.name or c.callback.__name__ for c in application.registered_commands}

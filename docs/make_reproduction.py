@@ -1,0 +1,290 @@
+"""Write the page on the reproduction, and its figures: `python docs/make_reproduction.py`."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import jinja2
+import numpy as np
+import polars as pl
+from make_pictures import keep, shrink
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import qbumpers
+from qbumpers import QLearner, Schedule, make_assistant, simulate
+from qbumpers.analysis.figures.curves import curves_figure
+from qbumpers.analysis.figures.style import NAMES, colour, figure, marker, readable
+from qbumpers.analysis.frontier import Regret, matched_regret
+from qbumpers.analysis.measures import trial_means, trial_samples
+from qbumpers.analysis.published import Comparison, published_numbers
+from qbumpers.analysis.report import Findings, write_report
+from qbumpers.analysis.section_4_1 import threshold_story
+from qbumpers.analysis.statistics import Estimate, mean_interval
+from qbumpers.experiments.design import PROFILES, reproduction
+from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments.store import Results, load
+from qbumpers.tasks import cliff_walking
+
+DOCS = Path(__file__).parent
+FIGURES = {
+    "figures": (
+        "frontier", "learning-curves", "heatmaps", "q-values", "threshold-maps",
+        "threshold-shares",
+    ),
+    "text": ("learning-curves",),
+}  # fmt: skip
+NONE = "local-q-thresholding/alpha=1"
+THRESHOLDING = "local-q-thresholding/alpha=0.0195"
+LEARNING, PERFORMANCE = "stochastic-q-bumpers/alpha=0.7", "stochastic-q-bumpers/alpha=0.2"
+"""The points that the paper compares: no help, a baseline, and a method matched in each measure."""
+PLUS_MINUS = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
+
+
+class Outcome(NamedTuple):
+    """What running one profile left.
+
+    Attributes:
+        findings: the tables of its report.
+        results: its files.
+        means: unassisted and assisted means by condition, float64 [2].
+    """
+
+    findings: Findings
+    results: Results
+    means: dict[str, np.ndarray]
+
+
+def make(folder: Path) -> None:
+    """Run both profiles and write `reproduction.md` and its images into `folder`."""
+    images = folder / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    outcomes = {profile: _run(profile, images) for profile in PROFILES}
+    figures = outcomes["figures"]
+    keep(tradeoff_figure(figures.findings.summary), images, "figure2")
+    summaries = {profile: outcome.findings.summary for profile, outcome in outcomes.items()}
+    keep(profiles_figure(summaries), images, "reproduction-profiles")
+    shown = ["none", "maximal", LEARNING]
+    keep(curves_figure(figures.results.episodes, shown), images, "learning")
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(DOCS),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    filters = (number, per_cent, estimate, label, readable)
+    environment.filters |= {f.__name__: f for f in filters}
+    thresholds = figures.findings.summary.filter(pl.col("assistant") == "local-q-thresholding")
+    page = environment.get_template("reproduction.md.j2").render(
+        version=qbumpers.__version__,
+        experiment=figures.results.experiment,
+        outcomes=outcomes,
+        printed={axis: regret_of_points(printed_points(), axis) for axis in (0, 1)},
+        own_points={axis: regret_of_points(figures.means, axis) for axis in (0, 1)},
+        pooled={axis: pooled_regret(figures, axis) for axis in (0, 1)},
+        story=threshold_story(figures.results.values.table, thresholds["alpha"].to_list()),
+        changes=list(changes()),
+        measure=measure,
+    )
+    (folder / "reproduction.md").write_text(page, encoding="utf-8")
+
+
+def _run(profile: str, images: Path) -> Outcome:
+    with TemporaryDirectory() as folder:
+        run_experiment(make_plan(reproduction("cliff-walking", profile)), folder)
+        findings = write_report(folder)
+        for name in FIGURES[profile]:
+            suffix = "" if profile == "figures" else f"{profile}-"
+            copy = images / f"reproduction-{suffix}{name}.png"
+            copy.write_bytes((Path(folder) / "figures" / f"{name}.png").read_bytes())
+            shrink(copy)
+        results = load(folder)
+    samples = trial_samples(trial_means(results.episodes), "assisted", "unassisted")
+    return Outcome(findings, results, {name: s.mean(axis=0) for name, s in samples.items()})
+
+
+def regret_of_points(means: dict[str, np.ndarray], axis: int) -> float:
+    """Less regret in the paper's way, from three points: 1 - (best - method) / (best - baseline).
+
+    Args:
+        means: assisted and unassisted mean by condition.
+        axis: 0 where performance is matched and learning compared, 1 the reverse.
+
+    Returns:
+        The share of the baseline's regret that the method avoids.
+    """
+    best, method, baseline = (
+        (NONE, LEARNING, THRESHOLDING)
+        if axis == 0
+        else ("maximal", PERFORMANCE, "local-q-thresholding/alpha=0.0191")
+    )
+    top, reached, reference = (means[name][1 - axis] for name in (best, method, baseline))
+    return float(1 - (top - reached) / (top - reference))
+
+
+def printed_points() -> dict[str, np.ndarray]:
+    """Assisted and unassisted mean by condition, as printed; NaN where the paper is silent."""
+    means: dict[str, np.ndarray] = {}
+    for row in published_numbers("cliff-walking")["number"]:
+        point = means.setdefault(row["condition"], np.full(2, np.nan))
+        point[("assisted", "unassisted").index(row["measure"])] = row["value"]
+    return means
+
+
+def pooled_regret(outcome: Outcome, axis: int) -> Regret:
+    """Regret against all thresholds below 1 taken as the one assistant that they are."""
+    samples = trial_samples(trial_means(outcome.results.episodes), "assisted", "unassisted")
+    of = {"local-q-thresholding": {}, "stochastic-q-bumpers": {}}
+    for name, values in samples.items():
+        if name.partition("/")[0] in of and name != NONE:
+            of[name.partition("/")[0]][name] = values
+    best = max(samples, key=lambda name: samples[name].mean(axis=0)[1 - axis])
+    pooled = {"thresholds below 1": np.concatenate(list(of["local-q-thresholding"].values()))}
+    generator = np.random.default_rng([outcome.results.experiment.seed, axis])
+    return matched_regret(of["stochastic-q-bumpers"], pooled, samples[best], axis, generator)
+
+
+class Change(NamedTuple):
+    """The reading of the numbers with one thing changed: assisted and unassisted returns.
+
+    Attributes:
+        what: in words.
+        none: without help.
+        thresholding: with Local Q-Thresholding, alpha = 0.0195.
+        bumpers: with Stochastic Q Bumpers, alpha = 0.7.
+    """
+
+    what: str
+    none: tuple[Estimate, Estimate]
+    thresholding: tuple[Estimate, Estimate]
+    bumpers: tuple[Estimate, Estimate]
+
+
+def changes() -> Iterator[Change]:
+    """What each departure from the text does by itself."""
+    literal = {"escalate": False, "clip": False}
+    for what, fraction, second, options in (
+        ("nothing: profile `figures`", 0.9, True, {}),
+        ("row 1: decay over 10% of the episodes", 0.1, True, {}),
+        ("row 2: no escalation", 0.9, True, {"escalate": False}),
+        ("row 3: no clipping", 0.9, True, {"clip": False}),
+        ("rows 1 to 3: profile `text`", 0.1, True, literal),
+        ("best overrides in place of second-best", 0.9, False, {}),
+    ):
+        schedule = Schedule(fraction=fraction)
+        learner = QLearner(epsilon=schedule, learning_rate=schedule)
+        yield Change(
+            what,
+            returns(learner, "none"),
+            returns(learner, "local-q-thresholding", alpha=0.0195, second=second),
+            returns(learner, "stochastic-q-bumpers", alpha=0.7, second=second, **options),
+        )
+
+
+def returns(learner: QLearner, name: str, **options: Any) -> tuple[Estimate, Estimate]:
+    """Assisted and unassisted return of 100 learners of Cliff Walking with an assistant."""
+    outcomes = simulate(cliff_walking(), make_assistant(name, **options), learner=learner).outcomes
+    return (
+        mean_interval(outcomes.assisted_return.mean(axis=1)),
+        mean_interval(outcomes.unassisted_return.mean(axis=1)),
+    )
+
+
+def tradeoff_figure(summary: pl.DataFrame) -> Figure:
+    """Every condition at a glance: learning upwards, performance to the right."""
+    with figure(8.6, 4.6) as drawing:
+        left, right = drawing.subplots(1, 2, sharey=True, width_ratios=(1, 4))
+        for axes in (left, right):
+            for part in summary.partition_by("assistant", maintain_order=True):
+                _draw_means(axes, part)
+        left.set(xlim=(-390, -310), xticks=[-350], ylabel="mean return without the assistant")
+        right.set(xlim=(42, 91), xlabel="mean return with the assistant")
+        right.spines["left"].set_visible(False)
+        right.tick_params(axis="y", length=0)
+        left.set_yscale("symlog", linthresh=100)
+        ticks = (0, -100, -300, -1000, -3000)
+        left.set_yticks(ticks, [f"{tick:,}".replace("-", "\N{MINUS SIGN}") for tick in ticks])
+        left.set_ylim(-5000, 40)
+        left.minorticks_off()
+        for alpha, place in ((0.1, (8, -3)), (0.2, (8, 3)), (0.7, (0, 10)), (1.0, (-4, 10))):
+            row = summary.filter(pl.col("condition") == f"stochastic-q-bumpers/alpha={alpha:g}")
+            right.annotate(
+                f"α = {alpha:g}", (row["assisted_mean"][0], row["unassisted_mean"][0]),
+                xytext=place, textcoords="offset points", fontsize=9,
+                color=colour("stochastic-q-bumpers"),
+            )  # fmt: skip
+        right.legend(loc="lower left")
+        right.annotate(
+            "better", (0.99, 0.97), xytext=(0.9, 0.83), xycoords="axes fraction",
+            textcoords="axes fraction", color="#555555", ha="right",
+            arrowprops={"arrowstyle": "->", "color": "#555555"},
+        )  # fmt: skip
+    return drawing
+
+
+def profiles_figure(summaries: dict[str, pl.DataFrame]) -> Figure:
+    """Assistants that override, a panel a profile, with the paper's points."""
+    with figure(9.4, 4.4) as drawing:
+        panels = drawing.subplots(1, len(summaries), sharex=True, sharey=True)
+        for axes, (profile, summary) in zip(panels, summaries.items(), strict=True):
+            helping = summary.filter(pl.col("overrides_mean") > 0, pl.col("alpha").is_not_null())
+            for part in helping.partition_by("assistant", maintain_order=True):
+                _draw_means(axes, part)
+            for name, point in printed_points().items():
+                axes.plot(
+                    *point, "*", markersize=15, fillstyle="none", markeredgewidth=1.6,
+                    color=colour(name.partition("/")[0]),
+                )  # fmt: skip
+            axes.set(title=f"profile {profile}", xlabel="mean return with the assistant")
+        panels[0].plot([], [], "*", ms=12, mfc="none", color="#555555", label="in the paper")
+        panels[0].set_ylabel("mean return without it")
+        panels[0].legend(loc="lower left")
+    return drawing
+
+
+def _draw_means(axes: Axes, part: pl.DataFrame) -> None:
+    name = str(part["assistant"][0])
+    axes.plot(
+        part["assisted_mean"], part["unassisted_mean"], linestyle="none", markersize=8,
+        marker=marker(name), color=colour(name), label=NAMES.get(name, name),
+    )  # fmt: skip
+
+
+def number(value: float | None, digits: int = 1) -> str:
+    """A number for the page; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def per_cent(value: float) -> str:
+    """A share in whole per cent."""
+    return number(100 * value, 0) + "%" if np.isfinite(value) else "–"
+
+
+def estimate(value: Estimate, digits: int = 1) -> str:
+    """A mean with half the width of its 95% interval."""
+    if not np.isfinite(value.mean):
+        return number(None)
+    half = (value.high - value.low) / 2
+    return f"{number(value.mean, digits)}{PLUS_MINUS}{number(half, digits)}"
+
+
+def measure(row: dict[str, Any], name: str) -> Estimate:
+    """A measure of a row of `summary.csv`."""
+    return Estimate(*(row[f"{name}_{part}"] for part in Estimate._fields))
+
+
+def label(row: Comparison) -> str:
+    """A printed number in words, with what kind of number it is where that is doubtful."""
+    if row.note:
+        return f"{row.what}, {row.note.replace(':', ';').partition(';')[0]}"
+    condition, _, measure = row.what.rpartition(", ")
+    return f"{readable(condition)}, {measure}"
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS)
