@@ -26,7 +26,7 @@ bench: $(VENV)/installed-dev  ## Measure speed, as ratios to named baselines
 	$(BIN)/python benchmarks/run.py
 
 docs: $(VENV)/installed-docs  ## Build the documentation into site/
-	$(BIN)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 clean:  ## Remove what make made
 	rm -rf $(VENV) demo site
