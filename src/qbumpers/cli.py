@@ -204,11 +204,7 @@ def _analyse(folder: Path) -> None:
     if findings.comparisons:
         _OUTPUT.print(_published_table(findings.comparisons))
     for matched, regret in findings.regrets.items():
-        r = regret.reduction
-        _OUTPUT.print(
-            f"At matched {matched}, regret is {100 * r.mean:.0f}% lower "
-            f"(95% interval {100 * r.low:.0f}% to {100 * r.high:.0f}%)."
-        )
+        _OUTPUT.print(f"At matched {matched}, {_regret(regret.reduction)}.")
     _OUTPUT.print(f"Report: [bold]{escape(str(folder / REPORT))}[/bold]", soft_wrap=True)
 
 
@@ -235,7 +231,18 @@ def _published_table(comparisons: Any) -> Table:
     return table
 
 
+def _regret(reduction: Any) -> str:
+    if not math.isfinite(reduction.mean):
+        return "no setting of the method reaches the level of the baseline"
+    if not math.isfinite(reduction.low):
+        return f"regret is {100 * reduction.mean:.0f}% lower (too few trials for an interval)"
+    low, high = 100 * reduction.low, 100 * reduction.high
+    return f"regret is {100 * reduction.mean:.0f}% lower (95% interval {low:.0f}% to {high:.0f}%)"
+
+
 def _interval(mean: float, low: float | None, high: float | None, digits: int = 1) -> str:
+    if low is not None and high is not None and 0 < high - low < 0.2:
+        digits = max(digits, 3)  # returns of size 1, for instance
     if low is None or high is None or not math.isfinite(low):
         return f"{mean:.{digits}f}"
     return f"{mean:.{digits}f} \N{PLUS-MINUS SIGN} {(high - low) / 2:.{digits}f}"

@@ -1,6 +1,6 @@
 """One decision of an assistant: what it knows, what chance adds, what it does, what is recorded.
 
-Every host (the Gymnasium wrapper, the simulators, a study) builds the same `Situation`, draws the
+Every host, the Gymnasium wrapper as well as the simulator, builds the same `Situation`, draws the
 same `Noise`, calls the same rule and keeps the same `Step`.
 """
 

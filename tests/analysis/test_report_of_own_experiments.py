@@ -9,6 +9,8 @@ import pytest
 
 from qbumpers.analysis.report import write_report
 from qbumpers.files import StoreError
+from qbumpers.tasks import make_task
+from qbumpers.values import solve
 from tests.analysis.pages import Page, interval
 from tests.experiments.examples import BUMPERS, LAKE, PLAIN, contents_of, run_into
 
@@ -80,9 +82,11 @@ def test_two_swept_methods_of_ones_own_have_regret_but_no_published_numbers(tmp_
 
 
 def test_texts_of_the_experiment_cannot_become_markup(tmp_path):
-    page = reported(tmp_path, **TAXI, **NONE, reproduces="<script>alert('&amp;')</script>")
+    path = tmp_path / "<b>'&amp;'.npz"
+    solve(make_task("Taxi-v4", discount=0.9)).save(path)
+    page = reported(tmp_path / "run", **TAXI, **NONE, values=str(path))
     assert page.sections == ANYWHERE
-    assert """reproduces = "<script>alert('&amp;')</script>\"""" in page.text
+    assert "<b>'&amp;'.npz" in page.text
 
 
 def test_a_report_needs_its_own_files_alone_and_comes_out_the_same(plain, tmp_path):

@@ -200,3 +200,9 @@ def test_values_of_another_task_are_refused(tmp_path):
 def test_a_wrong_reproduction_is_refused(arguments, changes, message):
     with pytest.raises(RequestError, match=message):
         reproduction(*arguments, **changes)
+
+
+def test_an_unknown_published_experiment_is_named_with_the_nearest():
+    settings = {"name": "mine", "task": "cliff-walking", "assistants": [{"name": "none"}]}
+    with pytest.raises(RequestError, match=r"reproduces 'clif-walking' .*'cliff-walking'"):
+        make_experiment({**settings, "reproduces": "clif-walking"})

@@ -125,7 +125,7 @@ class Experiment(_Model):
         seed: of all random streams.
     """
 
-    name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
+    name: Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
     reproduces: str | None = None
     task: TaskDesign
     values: str = "exact"
@@ -200,6 +200,8 @@ def make_experiment(settings: dict[str, Any], where: str = "experiment") -> Expe
         raise unknown_name(
             f"{where}: learner.perception", experiment.learner.perception, PERCEPTIONS
         )
+    if experiment.reproduces is not None and experiment.reproduces not in reproductions():
+        raise unknown_name(f"{where}: reproduces", experiment.reproduces, reproductions())
     try:
         experiment.named_assistants()
     except RequestError as error:

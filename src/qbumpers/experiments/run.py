@@ -1,7 +1,9 @@
 """Running an experiment: cells of trials over threads, each kept as soon as it is finished."""
 
+import contextlib
+import itertools
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import NamedTuple
@@ -134,32 +136,37 @@ def run_experiment(
         total = sum(cell.trials for cell in plan.cells)
         progress = Progress(total - sum(cell.trials for cell in missing), total, 0)
         report(progress)
-        for cell, simulation in _simulated(plan, missing, workers or os.cpu_count() or 1):
-            tables = episode_table(plan, cell, simulation), state_table(plan.task, simulation)
-            store.write(cell, *tables)
-            done, steps = progress.trials + cell.trials, progress.steps + simulation.steps
-            progress = Progress(done, total, steps)
-            report(progress)
+        work = _simulated(plan, missing, workers or os.cpu_count() or 1)
+        with contextlib.closing(work):
+            for cell, simulation in work:
+                tables = episode_table(plan, cell, simulation), state_table(plan.task, simulation)
+                store.write(cell, *tables)
+                done, steps = progress.trials + cell.trials, progress.steps + simulation.steps
+                progress = Progress(done, total, steps)
+                report(progress)
         store.assemble(plan.cells)
 
 
-def _simulated(plan: Plan, cells: list[Cell], workers: int) -> Iterator[tuple[Cell, Simulation]]:
+def _simulated(plan: Plan, cells: list[Cell], workers: int) -> Generator[tuple[Cell, Simulation]]:
     """Simulate cells in threads and yield each as it is finished, in any order."""
+    remaining = iter(cells)
     waiting: dict[Future[Simulation], Cell] = {}
     with ThreadPoolExecutor(workers) as pool:
-        try:
-            for cell in cells:
+        while True:
+            # Few at a time: whoever stops the run waits for those that have begun.
+            for cell in itertools.islice(remaining, 2 * workers - len(waiting)):
                 trials = range(cell.first, cell.first + cell.trials)
-                condition = plan.conditions[cell.condition]
-                task = pool.submit(
-                    run_condition, condition, trials=trials, seed=plan.experiment.seed
+                future = pool.submit(
+                    run_condition,
+                    plan.conditions[cell.condition],
+                    trials=trials,
+                    seed=plan.experiment.seed,
                 )
-                waiting[task] = cell
-            while waiting:
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    yield waiting.pop(future), future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+                waiting[future] = cell
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                yield waiting.pop(future), future.result()
 
 
 def episode_table(plan: Plan, cell: Cell, simulation: Simulation) -> pl.DataFrame:

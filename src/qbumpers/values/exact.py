@@ -27,7 +27,7 @@ def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
         discount: of the values, in (0, 1]; the task's where None.
 
     Returns:
-        The values. Terminal and unreachable states without a proper policy have value 0.
+        The values. Undiscounted, unreachable states without a proper policy have value 0.
 
     Raises:
         RequestError: where the discount is out of range, or is 1 and a reachable state has no
