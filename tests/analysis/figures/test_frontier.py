@@ -122,7 +122,9 @@ def test_a_cluster_of_an_own_rule_needs_no_alpha():
     rows = [summary_row(f"own/zeal={place}", None, place) for place in range(5)]
     own = pl.DataFrame(rows).with_columns(assisted_mean=50 + pl.int_range(5) / 10)
     far = summary_table({"maximal": None})
-    frontier_figure(pl.concat([own, far], how="vertical_relaxed").drop("alpha"))
+    drawing = frontier_figure(pl.concat([own, far], how="vertical_relaxed").drop("alpha"))
+    labels = {text.get_text() for axes in drawing.axes for text in axes.texts}
+    assert {f"zeal={place}" for place in range(5)} <= labels
 
 
 def test_single_trials_have_points_without_bars():
