@@ -10,6 +10,7 @@ from qbumpers.random_streams import (
     ENVIRONMENT,
     EVALUATION,
     LEARNER,
+    content_digest,
     content_words,
     draw,
     trial_streams,
@@ -82,3 +83,9 @@ def test_content_words_are_eight_words_of_thirty_two_bits():
     found = content_words(CONTENT)
     assert len(found) == 8
     assert all(isinstance(word, int) and 0 <= word < 2**32 for word in found)
+
+
+def test_a_digest_depends_on_contents_and_not_on_the_order_of_keys():
+    assert content_digest({"a": 1, "b": [2, 3]}) == content_digest({"b": [2, 3], "a": 1})
+    assert content_digest([1, 2]) != content_digest([2, 1])
+    assert len({content_digest(content) for content in (1, 1.0, "1", [1])}) == 4

@@ -25,18 +25,22 @@ _SHIFT_3, _SHIFT_11 = np.uint64(3), np.uint64(11)
 _SHIFT_24, _SHIFT_40 = np.uint64(24), np.uint64(40)
 
 
-def content_words(content: Any) -> list[int]:
-    """Seed words for a piece of JSON-like data: equal data, equal words, whatever its key order.
+def content_digest(content: Any) -> bytes:
+    """A digest of JSON-like data: equal data, equal digest, whatever the order of keys.
 
     Args:
         content: anything that `json.dumps` takes.
 
     Returns:
-        Eight 32-bit words of the SHA-256 digest of its canonical JSON.
+        The SHA-256 of its canonical JSON, 32 bytes.
     """
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    digest = hashlib.sha256(text.encode()).digest()
-    return np.frombuffer(digest, dtype="<u4").tolist()
+    return hashlib.sha256(text.encode()).digest()
+
+
+def content_words(content: Any) -> list[int]:
+    """Seed words for a piece of JSON-like data: `content_digest` as eight 32-bit numbers."""
+    return np.frombuffer(content_digest(content), dtype="<u4").tolist()
 
 
 def trial_streams(seed: int, content: Any, trials: range) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import shutil
 
 import pytest
 
@@ -13,18 +12,6 @@ from qbumpers.files import StoreError
 from tests.experiments.examples import BUMPERS, cells_of, contents_of, rows_of, run_into
 
 TABLES = ("episodes.parquet", "states.parquet")
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return run_into(tmp_path_factory.mktemp("whole"))
-
-
-@pytest.fixture
-def folder(whole, tmp_path):
-    """A finished run, to be spoiled."""
-    shutil.copytree(whole, tmp_path / "run")
-    return tmp_path / "run"
 
 
 @pytest.fixture

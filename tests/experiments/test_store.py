@@ -1,27 +1,14 @@
 """Reading an output folder back."""
 
-import shutil
-
 import polars as pl
 import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import make_experiment
-from qbumpers.experiments.store import digest, load, run_description
+from qbumpers.experiments.store import load, run_description
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import solve
 from tests.experiments.examples import run_into, settings
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    return run_into(tmp_path_factory.mktemp("whole"))
-
-
-@pytest.fixture
-def folder(whole, tmp_path):
-    shutil.copytree(whole, tmp_path / "run")
-    return tmp_path / "run"
 
 
 def test_a_finished_run_loads_as_it_was_run(whole):
@@ -77,9 +64,3 @@ def test_tables_older_than_the_design_are_not_taken_for_its_results(folder, chan
         run_into(folder, **changes, report=stop)
     with pytest.raises(RequestError, match="the run is not finished; run it again to continue"):
         load(folder)
-
-
-def test_a_digest_depends_on_contents_and_not_on_the_order_of_keys():
-    assert digest({"a": 1, "b": [2, 3]}) == digest({"b": [2, 3], "a": 1})
-    assert digest([1, 2]) != digest([2, 1])
-    assert len({digest(1), digest(1.0), digest("1"), digest([1])}) == 4

@@ -13,7 +13,8 @@ import polars as pl
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.store import Cell, digest, open_store
+from qbumpers.experiments.store import Cell, open_store
+from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, Simulation, make_condition
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import TabularTask, make_task
@@ -92,7 +93,7 @@ def make_plan(experiment: Experiment) -> Plan:
 
 def _cells(experiment: Experiment, conditions: dict[str, Condition]) -> Iterator[Cell]:
     for name, condition in conditions.items():
-        content = digest([experiment.seed, condition.content()])
+        content = content_digest([experiment.seed, condition.content()]).hex()
         for first in range(0, experiment.trials, BLOCK):
             yield Cell(name, content, first, min(BLOCK, experiment.trials - first))
 

@@ -1,9 +1,7 @@
 """Results in a folder: written atomically, never computed twice, read by the analysis."""
 
 import contextlib
-import hashlib
 import io
-import json
 import platform
 import tomllib
 from collections.abc import Iterator
@@ -61,11 +59,6 @@ class Results(NamedTuple):
     episodes: pl.DataFrame
     states: pl.DataFrame
     values: TabularValues
-
-
-def digest(content: Any) -> str:
-    """A SHA-256 of JSON-like data, in hexadecimal."""
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 class Store:
