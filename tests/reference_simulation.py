@@ -96,11 +96,26 @@ class _Words(np.random.bit_generator.ISeedSequence):
 
 def seeded_bit_generators(seed, content, trial):
     """NumPy's SFC64 four times: exploration, override noise, transitions, the greedy episode."""
+    philox = np.random.Philox(_seed_sequence(seed, content))
+    return _four(philox.random_raw(12 * (trial + 1)))  # one after another up to this trial
+
+
+def bit_generators_of_episode(seed, content, trial, episode):
+    """The same four, begun anew: trials lie 2**64 blocks apart, episodes follow one another."""
+    key = _seed_sequence(seed, content).generate_state(2, np.uint64)
+    philox = np.random.Philox(key=key, counter=[0, trial, 0, 0])
+    return _four(philox.random_raw(12 * (episode + 1)))
+
+
+def _seed_sequence(seed, content):
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     digest = hashlib.sha256(text.encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 32, 4)]
-    philox = np.random.Philox(np.random.SeedSequence([seed, *words]))
-    state = philox.random_raw(12 * (trial + 1))[-12:]  # drawn one after another up to this trial
+    return np.random.SeedSequence([seed, *words])
+
+
+def _four(drawn):
+    state = drawn[-12:]
     return [np.random.SFC64(_Words(state[first : first + 3])) for first in (0, 3, 6, 9)]
 
 
@@ -146,8 +161,8 @@ class ReferenceTrial:
     def __init__(self, condition, rule, *, seed, trial, observe=None):
         self.condition, self.task, self.learner = condition, condition.task, condition.learner
         self.rule, self.observe = rule, observe
-        generators = seeded_bit_generators(seed, condition.content(), trial)
-        self.explore, self.noise, self.nature, self.greedy = map(np.random.Generator, generators)
+        self.seed, self.trial = seed, trial
+        self.draw_from(seeded_bit_generators(seed, condition.learning(), trial))
         table = np.full(condition.values.shape, float(self.learner.initial_value))
         self.own_values = table.tolist()
         self.episodes, self.steps = [], []
@@ -156,10 +171,18 @@ class ReferenceTrial:
             for name in ("assisted", "overridden", "unassisted")
         }
 
+    def draw_from(self, bit_generators):
+        generators = map(np.random.Generator, bit_generators)
+        self.explore, self.noise, self.nature, self.greedy = generators
+
     def run(self):
-        for episode in range(self.condition.episodes):
-            assisted = self.assisted_episode(episode)
-            unassisted = self.greedy_episode()
+        for episode in range(self.condition.episodes + self.condition.retention):
+            if self.condition.common_random_numbers:
+                common = {"common_random_numbers": True}
+                self.draw_from(bit_generators_of_episode(self.seed, common, self.trial, episode))
+            helped = episode < self.condition.episodes
+            assisted = self.training_episode(episode, helped)
+            unassisted = self.greedy_episode(helped)
             self.episodes.append(
                 {f"assisted_{name}": value for name, value in assisted.items()}
                 | {f"unassisted_{name}": value for name, value in unassisted.items()}
@@ -181,10 +204,10 @@ class ReferenceTrial:
         next_state = int(task.next_state[place][index])
         return next_state, float(task.reward[place][index]), ends, events
 
-    def greedy_episode(self):
+    def greedy_episode(self, counted):
         state, total, length, events, ended = self.first_state(self.greedy), 0.0, 0, 0, False
         while length < self.task.episode_limit and not ended:
-            self.counts["unassisted"][state] += 1
+            self.counts["unassisted"][state] += counted
             own = self.own_values[state]
             action = one_of(own, max(own), self.greedy.random())
             state, reward, ended, happened = self.outcome(state, action, self.greedy)
@@ -198,7 +221,7 @@ class ReferenceTrial:
             return int(tie * len(own))
         return one_of(own, max(own), tie)
 
-    def assisted_episode(self, episode):
+    def training_episode(self, episode, helped):
         epsilon = scheduled(self.learner.epsilon, episode, self.condition.episodes)
         rate = scheduled(self.learner.learning_rate, episode, self.condition.episodes)
         state = self.first_state(self.nature)
@@ -210,19 +233,20 @@ class ReferenceTrial:
             proposed = self.propose(state, epsilon)
             noise = Noise(self.noise.random(), self.noise.random())
             situation = Situation(values, proposed, earned, discount, start_value)
-            executed, probability = self.rule(situation, noise)
+            executed, probability = self.rule(situation, noise) if helped else (proposed, 0.0)
             next_state, reward, ended, happened = self.outcome(state, executed, self.nature)
             credited = self.learn(state, proposed, executed, reward, next_state, ended, rate)
             step = SimpleNamespace(
-                episode=episode, state=state, proposed=proposed, executed=executed,
+                episode=episode, state=state, next_state=next_state, events=happened,
+                proposed=proposed, executed=executed,
                 credited=credited, overridden=executed != proposed, probability=probability,
                 coin=noise.coin, tie=noise.tie, values=values,
                 projected_return=earned + discount * values[proposed], reward=reward,
             )  # fmt: skip
             self.steps.append(step)
-            if self.observe:
+            if self.observe and helped:
                 self.observe(step)
-            self.counts["assisted"][state] += 1
+            self.counts["assisted"][state] += helped
             self.counts["overridden"][state] += step.overridden
             earned = earned + discount * reward
             discount = discount * self.condition.discount

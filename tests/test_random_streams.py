@@ -13,9 +13,10 @@ from qbumpers.random_streams import (
     content_digest,
     content_words,
     draw,
+    episode_streams,
     trial_streams,
 )
-from tests.reference_simulation import seeded_bit_generators
+from tests.reference_simulation import bit_generators_of_episode, seeded_bit_generators
 
 CONTENT = {"assistant": "none", "options": {"alpha": 0.5, "second": True}, "list": [1, None]}
 words = st.integers(0, 2**64 - 1)
@@ -61,6 +62,33 @@ def test_streams_of_a_trial_do_not_depend_on_the_trials_asked_with_it(parts):
         for end, part in zip(ends.tolist(), parts, strict=True)
     ]
     assert np.array_equal(np.concatenate(pieces), trial_streams(3, CONTENT, range(10)))
+
+
+@given(st.integers(0, 2**40), st.integers(0, 2**31), st.integers(0, 12), st.integers(1, 5))
+def test_an_episode_owns_four_streams_seeded_as_numpy_would(seed, trial, episode, following):
+    trials = range(trial, trial + 1)
+    states = episode_streams(seed, CONTENT, trials, episode + following)[0, episode]
+    expected = bit_generators_of_episode(seed, CONTENT, trial, episode)
+    for row, bit_generator in enumerate(expected):
+        assert states[row].tolist() == bit_generator.state["state"]["state"].tolist()
+
+
+def test_streams_of_the_first_episodes_do_not_depend_on_how_many_follow():
+    many = episode_streams(3, CONTENT, range(2, 6), 12)
+    assert many.shape == (4, 12, 4, 4)
+    assert np.array_equal(episode_streams(3, CONTENT, range(2, 6), 5), many[:, :5])
+    assert np.array_equal(episode_streams(3, CONTENT, range(3, 6, 2), 12), many[1::2])
+
+
+def test_every_episode_trial_seed_and_content_gets_streams_of_its_own():
+    states = np.concatenate(
+        [
+            episode_streams(seed, content, range(4), 30)
+            for seed in range(2)
+            for content in (CONTENT, [])
+        ]
+    ).reshape(-1, 4)
+    assert len(np.unique(states, axis=0)) == 2 * 2 * 4 * 30 * 4
 
 
 def test_order_of_keys_does_not_matter():

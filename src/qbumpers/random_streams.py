@@ -19,6 +19,7 @@ LEARNER, ASSISTANT, ENVIRONMENT, EVALUATION = range(4)
 
 _STREAMS = 4
 _SEED_WORDS = 3
+_TRIAL_BITS = 64  # room for the episodes of a trial, in blocks of Philox
 _BLOCKS = _STREAMS * _SEED_WORDS // 4  # of Philox a trial, each of four 64-bit words
 _ONE = np.uint64(1)
 _SHIFT_3, _SHIFT_11 = np.uint64(3), np.uint64(11)
@@ -60,6 +61,29 @@ def trial_streams(seed: int, content: Any, trials: range) -> np.ndarray:
     source.advance(trials.start * _BLOCKS)
     seeds = source.random_raw(len(trials) * _STREAMS * _SEED_WORDS)
     return _warmed(seeds.reshape(len(trials), _STREAMS, _SEED_WORDS))
+
+
+def episode_streams(seed: int, content: Any, trials: range, episodes: int) -> np.ndarray:
+    """Streams that begin anew in every episode.
+
+    Args:
+        seed: of the experiment, not negative.
+        content: what has these streams in common, as JSON-like data; see `content_words`.
+        trials: which trials.
+        episodes: E, of a trial; the streams of its first ones do not depend on how many follow.
+
+    Returns:
+        uint64 [T, E, 4, 4]: for each trial, episode and source of chance, the state of an SFC64
+        generator.
+    """
+    seeds = np.empty((len(trials), episodes, _STREAMS, _SEED_WORDS), np.uint64)
+    sequence = np.random.SeedSequence([seed, *content_words(content)])
+    for place, trial in enumerate(trials):
+        source = np.random.Philox(sequence)
+        source.advance(trial << _TRIAL_BITS)
+        seeds[place] = source.random_raw(seeds[0].size).reshape(seeds[0].shape)
+    states = _warmed(seeds.reshape(-1, _STREAMS, _SEED_WORDS))
+    return states.reshape(len(trials), episodes, _STREAMS, _SEED_WORDS + 1)
 
 
 @compiled

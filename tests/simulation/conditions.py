@@ -12,24 +12,21 @@ BUMPERS = ("stochastic-q-bumpers", {"alpha": 0.7, "second": True})
 THRESHOLDS = ("local-q-thresholding", {"alpha": 0.0195, "second": True})
 
 
-def on_the_cliff(assistant, *, perception="transition", episodes=12, learner=None):
+def on_the_cliff(assistant, *, episodes=12, **settings):
     name, options = assistant
     return make_condition(
-        cliff_walking(),
-        make_assistant(name, **options),
-        perception=perception,
-        episodes=episodes,
-        learner=learner,
+        cliff_walking(), make_assistant(name, **options), episodes=episodes, **settings
     )
 
 
-def on_slippery_ice():
+def on_slippery_ice(**settings):
     task = make_task("FrozenLake-v1", discount=0.95, episode_limit=40, is_slippery=True)
     assistant = make_assistant("stochastic-q-bumpers", alpha=0.8, v_min=-0.1)
-    return make_condition(task, assistant, episodes=40, learner=QLearner(discount=0.95))
+    learner = QLearner(discount=0.95)
+    return make_condition(task, assistant, episodes=40, learner=learner, **settings)
 
 
-def in_a_random_world():
+def in_a_random_world(**settings):
     """Nine states, three actions, three outcomes of each, several starts; values that mislead.
 
     Task, values and learner each have a discount of their own.
@@ -68,4 +65,5 @@ def in_a_random_world():
         learner=learner,
         perception="transition-disruption",
         episodes=30,
+        **settings,
     )

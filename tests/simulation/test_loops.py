@@ -7,6 +7,7 @@ import pytest
 
 from qbumpers.learners import PERCEPTIONS, QLearner
 from qbumpers.simulation import Script, Steps, record, run
+from qbumpers.tasks import cliff_walking
 from tests.reference_simulation import RULES, ReferenceTrial
 from tests.simulation.conditions import (
     BUMPERS,
@@ -28,6 +29,15 @@ CONDITIONS = {
     },
     "slippery ice": on_slippery_ice(),
     "random world": in_a_random_world(),
+    "cliff, alone afterwards": on_the_cliff(BUMPERS, retention=7),
+    "slippery ice, alone afterwards, common": on_slippery_ice(
+        retention=9, common_random_numbers=True
+    ),
+    "random world, alone afterwards": in_a_random_world(retention=11),
+    "random world, common": in_a_random_world(common_random_numbers=True),
+    "cliff, common, a single episode": on_the_cliff(
+        BUMPERS, episodes=1, common_random_numbers=True
+    ),
 }
 SEED, TRIALS = 11, range(2, 5)
 
@@ -83,8 +93,12 @@ def test_the_conditions_compared_reach_every_kind_of_step(plain_trials, conditio
         assert 0 < overridden < len(steps)
     if condition.assistant.name == "stochastic-q-bumpers":
         assert any(0 < step.probability < 1 for step in steps)
+    if condition.retention:
+        alone = [step for step in steps if step.episode >= condition.episodes]
+        assert {step.probability for step in alone} == {0.0}
+        assert len({step.credited for step in alone}) > 1
     lengths = {episode["assisted_length"] for episode in episodes}
-    assert min(lengths) < condition.task.episode_limit
+    assert min(lengths) < condition.task.episode_limit or condition.episodes == 1
 
 
 def test_a_script_of_a_deterministic_task_repeats_its_trial():
@@ -101,3 +115,23 @@ def test_a_trial_ends_with_its_script():
     found = record(condition, script=Script(up, np.zeros(7), np.zeros(7)))
     assert found.proposed.tolist() == [0] * 7
     assert found.state.tolist() == [36, 24, 12, 0, 0, 0, 0]
+    assert found.next_state.tolist() == [24, 12, 0, 0, 0, 0, 0]
+
+
+def test_a_step_leads_to_where_the_next_one_begins_and_tells_how_it_ended():
+    """A closed form of Cliff Walking: the goal is cell (3, 11), the cliff (3, 1) to (3, 10)."""
+    found = record(on_the_cliff(BUMPERS, episodes=30, retention=5), trial=1, seed=SEED)
+    same = found.episode[1:] == found.episode[:-1]
+    assert (found.next_state[:-1][same] == found.state[1:][same]).all()
+    assert (found.state[1:][~same] == 36).all()
+    terminated, success, crash = ((found.events & bit) > 0 for bit in (1, 2, 4))
+    arrived = (found.executed == 2) & (found.state == 35)  # down, from above the goal
+    assert np.array_equal(terminated, arrived)
+    assert np.array_equal(success, arrived)
+    assert np.array_equal(crash, found.reward == -100)
+    assert (found.next_state[crash] == 36).all()
+    assert arrived.any()
+    assert crash.any()
+    last = np.append(~same, True)
+    lengths = np.bincount(found.episode)
+    assert (terminated[last] | (lengths == cliff_walking().episode_limit)).all()

@@ -24,6 +24,8 @@ class Condition(NamedTuple):
         learner: the simulated person.
         perception: name of what they believe happened.
         episodes: E, assisted episodes of a trial, each followed by a greedy one without help.
+        retention: R, further episodes in which the learner goes on without the assistant.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
     """
 
     task: TabularTask
@@ -33,9 +35,19 @@ class Condition(NamedTuple):
     learner: QLearner
     perception: str
     episodes: int
+    retention: int = 0
+    common_random_numbers: bool = False
 
     def content(self) -> dict[str, Any]:
-        """The condition as JSON-like data: it seeds the random streams and names stored results."""
+        """All that decides a trial's outcomes, as JSON-like data: it names stored results."""
+        return {
+            **self.learning(),
+            "retention": self.retention,
+            "common_random_numbers": self.common_random_numbers,
+        }
+
+    def learning(self) -> dict[str, Any]:
+        """What decides the assisted episodes, as JSON-like data: it seeds the random streams."""
         return {
             "task": self.task.digest(),
             "values": hashlib.sha256(self.values.tobytes()).hexdigest(),
@@ -60,6 +72,8 @@ def make_condition(
     learner: QLearner | None = None,
     perception: str = "transition",
     episodes: int = 100,
+    retention: int = 0,
+    common_random_numbers: bool = False,
 ) -> Condition:
     """Check everything that a simulation needs, before any of it runs.
 
@@ -71,6 +85,8 @@ def make_condition(
         learner: the simulated person; where None, the paper's, with the task's discount.
         perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
         episodes: of a trial, at least 1.
+        retention: further episodes without the assistant, not negative.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
 
     Returns:
         The condition.
@@ -81,6 +97,8 @@ def make_condition(
     """
     if episodes < 1:
         raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")
+    if retention < 0:
+        raise RequestError(f"retention = {retention!r}; 0 or more is needed")
     if isinstance(assistant, str):
         assistant = make_assistant(assistant)
     named_perception(perception)
@@ -101,6 +119,8 @@ def make_condition(
         learner=_checked_learner(learner or QLearner(discount=task.discount)),
         perception=perception,
         episodes=episodes,
+        retention=retention,
+        common_random_numbers=common_random_numbers,
     )
 
 

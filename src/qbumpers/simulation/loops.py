@@ -62,11 +62,14 @@ class StateCounts(NamedTuple):
 class Steps(NamedTuple):
     """Arrays [N] of step records, in order; `decisions.Step` says what each means.
 
-    `state` is where the step began; `values` is [N, A]; `episode` counts from 0.
+    `state` is where the step began and `next_state` where it led; `events` are bits of
+    `qbumpers.tasks.dynamics`; `values` is [N, A]; `episode` counts from 0.
     """
 
     episode: np.ndarray
     state: np.ndarray
+    next_state: np.ndarray
+    events: np.ndarray
     proposed: np.ndarray
     executed: np.ndarray
     credited: np.ndarray
@@ -88,9 +91,11 @@ class Script(NamedTuple):
 
 
 @register_jitable(**INLINE)
-def _record(record: Any, index: int, episode: int, state: int, step: Step) -> None:
+def _record(record: Any, index: int, episode: int, state: int, led: Any, step: Step) -> None:
     record.episode[index] = episode
     record.state[index] = state
+    record.next_state[index] = led[0]
+    record.events[index] = led[1]
     record.proposed[index] = step.proposed
     record.executed[index] = step.executed
     record.credited[index] = step.credited
@@ -134,7 +139,7 @@ def _learn(
 @register_jitable(**INLINE)
 def _assisted_episode(
     dynamics, values, gamma, own_values, learner, perception, options, memory, streams, width,
-    rates, outcomes, place, counts, record, recorded, script,
+    rates, helped, outcomes, place, counts, record, recorded, script,
 ):  # fmt: skip
     """One training episode; returns the rule's memory and how many steps there are so far."""
     explore, chance, nature = streams[LEARNER], streams[ASSISTANT], streams[ENVIRONMENT]
@@ -155,8 +160,10 @@ def _assisted_episode(
             noise = Noise(script.coin[recorded], script.tie[recorded])
         known = row(values, state, width)
         situation = Situation(known, proposed, earned, discount, start_value)
-        decision = decide(situation, noise, options, memory)
-        executed = int(decision.action)
+        executed, probability = proposed, 0.0
+        if helped:
+            decision = decide(situation, noise, options, memory)
+            executed, probability = int(decision.action), float(decision.probability)
         if not 0 <= executed < dynamics.actions:
             raise RequestError("the assistant's rule chose an action outside the action space")
         index = transition(dynamics, state, executed, _chance(dynamics.outcomes, nature))
@@ -165,16 +172,17 @@ def _assisted_episode(
         experience = perceive(perception, proposed, executed, reward, learner.penalty)
         step = Step(
             proposed, executed, experience.action, executed != proposed,
-            float(decision.probability), noise.coin, noise.tie, known,
+            probability, noise.coin, noise.tie, known,
             projected_return(earned, discount, known[proposed]), reward,
         )  # fmt: skip
-        memory = observe(memory, step, options)
+        if helped:
+            memory = observe(memory, step, options)
         _learn(own_values, state, experience, event, next_state, learner, learning_rate, width)
         if counts is not None:
-            counts.assisted[state] += 1
+            counts.assisted[state] += helped
             counts.overridden[state] += step.overridden
         if record is not None:
-            _record(record, recorded, place[1], state, step)
+            _record(record, recorded, place[1], state, (next_state, event), step)
         recorded += 1
         earned += discount * reward
         discount *= gamma
@@ -193,14 +201,14 @@ def _assisted_episode(
 
 
 @register_jitable(**INLINE)
-def _greedy_episode(dynamics, own_values, stream, width, outcomes, place, counts):
+def _greedy_episode(dynamics, own_values, stream, width, helped, outcomes, place, counts):
     """One episode without help, exploration or learning."""
     state = first_state(dynamics, _chance(len(dynamics.start_states), stream))
     total, events, length = 0.0, 0, 0
     while length < dynamics.episode_limit:
         action = choose_greedily(row(own_values, state, width), draw(stream))
         if counts is not None:
-            counts.unassisted[state] += 1
+            counts.unassisted[state] += helped
         index = transition(dynamics, state, action, _chance(dynamics.outcomes, stream))
         total += dynamics.reward[index]
         events |= dynamics.events[index]
@@ -213,12 +221,23 @@ def _greedy_episode(dynamics, own_values, stream, width, outcomes, place, counts
     outcomes.unassisted_events[place] = events
 
 
+@register_jitable(**INLINE)
+def _begin(own_streams: np.ndarray, streams: np.ndarray, trial: int, episode: int) -> None:
+    """Copy streams, number by number: copying slices takes Numba far longer to compile."""
+    for source in range(own_streams.shape[0]):
+        for word in range(own_streams.shape[1]):
+            own_streams[source, word] = streams[trial, episode, source, word]
+
+
 @compiled
 def run_trials(
-    dynamics, values, gamma, learner, perception, options, streams, width, own_values,
+    dynamics, values, gamma, learner, perception, options, streams, retention, width, own_values,
     outcomes, counts, record, script,
 ):  # fmt: skip
     """Run trials one after another.
+
+    In the last `retention` episodes the assistant is gone: the learner goes on by itself, with the
+    exploration and learning rate that the schedules end with.
 
     Args:
         dynamics: the task.
@@ -227,7 +246,9 @@ def run_trials(
         learner: the simulated person.
         perception: what they believe happened.
         options: of the assistant; their type selects its rule.
-        streams: uint64 [4 T, 4], see `qbumpers.random_streams`; consumed.
+        streams: uint64 [T, 1, 4, 4] or, to begin anew in every episode, [T, E, 4, 4], see
+            `qbumpers.random_streams`.
+        retention: R, of the E episodes.
         width: a tuple of A integers, see `qbumpers.borrowing.row`.
         own_values: float64 [S, A], room for the learner's values; overwritten.
         outcomes: `Outcomes` of arrays [T, E], filled.
@@ -242,31 +263,37 @@ def run_trials(
         RequestError: where the rule chooses an action that there is not.
     """
     trials, episodes = outcomes.assisted_return.shape
+    training = episodes - retention
     dynamics, values, own_values = borrow(dynamics), borrow(values), borrow(own_values)
     outcomes, counts = borrow(outcomes), borrow(counts)
     record, script = borrow(record), borrow(script)
+    own_streams = np.empty((4, 4), np.uint64)
+    rows = borrow(own_streams)
+    trial_streams = (
+        row(rows, 0, _WORDS),
+        row(rows, 1, _WORDS),
+        row(rows, 2, _WORDS),
+        row(rows, 3, _WORDS),
+    )
     recorded = 0
     for trial in range(trials):
         own_values[:] = learner.initial_value
         memory = start(options)
-        trial_streams = (
-            row(streams, 4 * trial, _WORDS),
-            row(streams, 4 * trial + 1, _WORDS),
-            row(streams, 4 * trial + 2, _WORDS),
-            row(streams, 4 * trial + 3, _WORDS),
-        )
         for episode in range(episodes):
+            if episode == 0 or streams.shape[1] > 1:
+                _begin(own_streams, streams, trial, episode)
+            helped = episode < training
             rates = (
-                scheduled(learner.epsilon, episode, episodes),
-                scheduled(learner.learning_rate, episode, episodes),
+                scheduled(learner.epsilon, episode, training),
+                scheduled(learner.learning_rate, episode, training),
             )
             memory, recorded = _assisted_episode(
                 dynamics, values, gamma, own_values, learner, perception, options, memory,
-                trial_streams, width, rates, outcomes, (trial, episode),
+                trial_streams, width, rates, helped, outcomes, (trial, episode),
                 counts, record, recorded, script,
             )  # fmt: skip
             _greedy_episode(
-                dynamics, own_values, trial_streams[EVALUATION], width, outcomes,
+                dynamics, own_values, trial_streams[EVALUATION], width, helped, outcomes,
                 (trial, episode), counts,
             )  # fmt: skip
     return recorded

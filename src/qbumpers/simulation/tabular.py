@@ -11,7 +11,7 @@ from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners import QLearner
 from qbumpers.learners import perception as named_perception
-from qbumpers.random_streams import trial_streams
+from qbumpers.random_streams import episode_streams, trial_streams
 from qbumpers.simulation.condition import Condition, make_condition
 from qbumpers.simulation.loops import (
     Outcomes,
@@ -50,6 +50,8 @@ def simulate(
     learner: QLearner | None = None,
     perception: str = "transition",
     episodes: int = 100,
+    retention: int = 0,
+    common_random_numbers: bool = False,
     trials: int | range = 100,
     seed: int = 0,
     workers: int = 1,
@@ -67,6 +69,9 @@ def simulate(
         learner: the simulated person; where None, the paper's, with the task's discount.
         perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
         episodes: of a trial, at least 1.
+        retention: further episodes in which the learner goes on without the assistant, each
+            followed by a greedy one.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
         trials: how many, at least 1; or which.
         seed: of the experiment, not negative.
         workers: threads.
@@ -78,7 +83,14 @@ def simulate(
         RequestError: as `make_condition`, and for a number of trials below 1 or a negative seed.
     """
     condition = make_condition(
-        task, assistant, values=values, learner=learner, perception=perception, episodes=episodes
+        task,
+        assistant,
+        values=values,
+        learner=learner,
+        perception=perception,
+        episodes=episodes,
+        retention=retention,
+        common_random_numbers=common_random_numbers,
     )
     return run(condition, trials=trials, seed=seed, workers=workers)
 
@@ -124,10 +136,12 @@ def record(
     """
     if script is not None:
         _check_script(script, condition.task.actions)
-    room = condition.episodes * condition.task.episode_limit
+    room = (condition.episodes + condition.retention) * condition.task.episode_limit
     steps = Steps(
         episode=np.zeros(room, np.int64),
         state=np.zeros(room, np.int64),
+        next_state=np.zeros(room, np.int64),
+        events=np.zeros(room, np.uint8),
         proposed=np.zeros(room, np.int64),
         executed=np.zeros(room, np.int64),
         credited=np.zeros(room, np.int64),
@@ -176,7 +190,8 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
 
 def _room(condition: Condition, trials: int) -> Outcomes:
     kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
-    return Outcomes(*(np.zeros((trials, condition.episodes), kind) for kind in kinds))
+    shape = (trials, condition.episodes + condition.retention)
+    return Outcomes(*(np.zeros(shape, kind) for kind in kinds))
 
 
 def _call_loops(
@@ -199,7 +214,8 @@ def _call_loops(
         condition.learner,
         named_perception(condition.perception),
         condition.assistant.options,
-        trial_streams(seed, condition.content(), trials).reshape(-1, 4),
+        _streams(condition, trials, seed),
+        condition.retention,
         (0,) * condition.task.actions,
         np.empty_like(condition.values),
         outcomes,
@@ -207,3 +223,11 @@ def _call_loops(
         steps,
         script,
     )
+
+
+def _streams(condition: Condition, trials: range, seed: int) -> np.ndarray:
+    if condition.common_random_numbers:
+        # Each episode begins anew: episodes of other length before it change nothing.
+        episodes = condition.episodes + condition.retention
+        return episode_streams(seed, {"common_random_numbers": True}, trials, episodes)
+    return trial_streams(seed, condition.learning(), trials)[:, None]
