@@ -3,7 +3,7 @@
 from typing import Annotated
 
 import pytest
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from qbumpers.errors import RequestError, from_validation, unknown_name
 
@@ -15,6 +15,25 @@ class Trial(BaseModel):
 
 class Plan(BaseModel):
     trials: list[Trial]
+
+
+class Walk(BaseModel):
+    task: str
+    steps: int = 3
+
+    @field_validator("task")
+    @classmethod
+    def _known(cls, task: str) -> str:
+        if task != "cliff":
+            raise unknown_name("task", task, ["cliff"])
+        return task
+
+    @field_validator("steps")
+    @classmethod
+    def _odd(cls, steps: int) -> int:
+        if steps % 2 == 0:
+            raise ValueError("an odd number is needed")
+        return steps
 
 
 def refused(model: type[BaseModel], content: dict) -> str:
@@ -78,3 +97,15 @@ def test_a_problem_of_the_whole_has_no_field():
         Trial.model_validate(7)
     assert str(from_validation(caught.value, "trial")).startswith("trial: ")
     assert "trial:  =" not in str(from_validation(caught.value, "trial"))
+
+
+def test_a_check_that_says_what_is_wrong_is_told_in_its_own_words():
+    message = refused(Walk, {"task": "clif", "steps": 3})
+    assert message == "plan a.toml: unknown task 'clif' (did you mean 'cliff'?). Known: cliff"
+
+
+def test_a_check_that_does_not_is_told_with_its_field_and_value():
+    message = refused(Walk, {"task": "clif", "steps": 4})
+    assert "unknown task 'clif'" in message
+    assert "; steps = 4: " in message
+    assert message.endswith("an odd number is needed")

@@ -1,6 +1,7 @@
 from .assistants import Assistant, make_assistant, register_assistant
 from .decisions import Decision, Noise, Situation, Step
 from .errors import RequestError
+from .experiments.store import load
 from .learners import QLearner, Schedule
 from .shared_control import SharedControl
 from .simulation import Simulation, simulate
@@ -25,6 +26,7 @@ __all__ = [
     "TabularValues",
     "__version__",
     "learn_values",
+    "load",
     "load_values",
     "make_assistant",
     "make_task",

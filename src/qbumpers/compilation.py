@@ -22,7 +22,7 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 """Settings for pieces of a hot loop: their calls must vanish, with all reference counting."""
 
 
-_NEVER_COMPILED = {"analysis", "cli.py", "experiments", "shared_control.py"}
+_NEVER_COMPILED = {"analysis", "cli", "experiments", "files.py", "shared_control.py", "tuning"}
 
 
 @functools.cache

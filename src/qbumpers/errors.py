@@ -51,6 +51,9 @@ def from_validation(
         field = ".".join(str(part) for part in problem["loc"])
         given = "" if problem["type"] == "missing" else f" = {problem['input']!r}"
         message = problem["msg"][:1].lower() + problem["msg"][1:]
+        if "ctx" in problem and isinstance(problem["ctx"].get("error"), RequestError):
+            problems.append(str(problem["ctx"]["error"]))  # says itself what was given and where
+            continue
         if problem["type"] == "extra_forbidden":
             message = f"unknown field{_nearest(str(problem['loc'][-1]), known_fields)}"
         problems.append(f"{field}{given}: {message}" if field else message)

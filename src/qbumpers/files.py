@@ -1,13 +1,21 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, in folders of this machine and in object stores."""
 
 import contextlib
 import os
-from collections.abc import Callable
+import platform
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import filelock
+
+from qbumpers.errors import RequestError
 
 LEFT_BEHIND = ".*.part"
 """Pattern of the temporary files that a killed process leaves."""
+
+_LOCK = ".lock"
 
 
 class StoreError(OSError):
@@ -36,3 +44,229 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
     finally:
         with contextlib.suppress(OSError):  # an unwritable folder: nothing was left there
             temporary.unlink(missing_ok=True)
+
+
+class Folder(Protocol):
+    """A folder of files by name, for instance "cells/1749e96024414f24/000000-100.parquet"."""
+
+    def names(self, under: str) -> list[str]:
+        """Names of the files in a folder below, sorted; none where there is no such folder."""
+        ...
+
+    def read(self, name: str) -> bytes | None:
+        """What a file holds; None where there is none."""
+        ...
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file so that it appears whole or not at all; StoreError where it cannot be."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Delete a file, if it is there."""
+        ...
+
+    def locked(self) -> contextlib.AbstractContextManager[None]:
+        """Keep other writers out, and clear away what a killed one left half-written.
+
+        RequestError where the folder is a file or another run is writing to it; StoreError where
+        it cannot be written.
+        """
+        ...
+
+
+def open_folder(location: str | Path) -> Folder:
+    """A folder of this machine, or one that fsspec reaches.
+
+    Args:
+        location: a path, or a URL such as "s3://bucket/run".
+
+    Returns:
+        The folder; nothing is made or looked at yet.
+
+    Raises:
+        RequestError: where the URL is of no known kind, or what it needs is not installed.
+    """
+    if "://" not in str(location):
+        return LocalFolder(Path(location))
+    return RemoteFolder(str(location))
+
+
+class LocalFolder:
+    """A folder of this machine, or a shared one that is mounted on it.
+
+    Args:
+        path: of the folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __str__(self) -> str:
+        """The path."""
+        return str(self._path)
+
+    def names(self, under: str) -> list[str]:
+        """See `Folder`."""
+        place = self._path / under
+        if not place.is_dir():
+            return []
+        return sorted(f"{under}/{path.name}" for path in place.iterdir() if path.is_file())
+
+    def read(self, name: str) -> bytes | None:
+        """See `Folder`."""
+        try:
+            return (self._path / name).read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            message = f"cannot read {self._path / name}: {error.strerror or error}"
+            raise StoreError(message) from error
+
+    def write(self, name: str, content: bytes) -> None:
+        """See `Folder`."""
+        write_atomically(self._path / name, lambda temporary: temporary.write_bytes(content))
+
+    def remove(self, name: str) -> None:
+        """See `Folder`."""
+        (self._path / name).unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """See `Folder`; the lock of a killed run opens by itself."""
+        if self._path.exists() and not self._path.is_dir():
+            raise RequestError(f"output folder {self._path}: it is a file")
+        try:
+            self._path.mkdir(parents=True, exist_ok=True)
+            lock = filelock.FileLock(self._path / _LOCK).acquire(timeout=0)
+        except filelock.Timeout as error:
+            raise RequestError(
+                f"output folder {self._path}: another run is writing to it; wait for it, or choose "
+                "another folder"
+            ) from error
+        except OSError as error:
+            raise StoreError(
+                f"cannot write {self._path / _LOCK}: {error.strerror or error}"
+            ) from error
+        with lock:
+            for left in self._path.rglob(LEFT_BEHIND):
+                left.unlink(missing_ok=True)
+            yield
+
+
+class RemoteFolder:
+    """A folder that fsspec reaches, for instance in an object store.
+
+    Args:
+        url: of the folder.
+
+    Raises:
+        RequestError: where the URL is of no known kind, or what it needs is not installed.
+    """
+
+    def __init__(self, url: str) -> None:
+        try:
+            import fsspec
+        except ImportError as error:
+            raise RequestError(f"{url}: pip install 'qbumpers[remote]'") from error
+        try:
+            self._system, path = fsspec.core.url_to_fs(url)
+        except (ImportError, ValueError) as error:
+            raise RequestError(f"{url}: {error}") from error
+        self._url, self._root = url.rstrip("/"), path.rstrip("/")
+
+    def __str__(self) -> str:
+        """The URL."""
+        return self._url
+
+    def names(self, under: str) -> list[str]:
+        """See `Folder`."""
+        with self._failing(under):
+            try:
+                found = self._system.ls(self._place(under), detail=False, refresh=True)
+            except FileNotFoundError:
+                return []
+        return sorted(f"{under}/{str(path).rpartition('/')[2]}" for path in found)
+
+    def read(self, name: str) -> bytes | None:
+        """See `Folder`."""
+        with self._failing(name):
+            try:
+                return self._system.cat_file(self._place(name))
+            except FileNotFoundError:
+                return None
+
+    def write(self, name: str, content: bytes) -> None:
+        """See `Folder`."""
+        with self._failing(name):
+            self._put(name, content, "overwrite")
+
+    def remove(self, name: str) -> None:
+        """See `Folder`."""
+        with self._failing(name), contextlib.suppress(FileNotFoundError):
+            self._system.rm_file(self._place(name))
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """See `Folder`; an object store cannot tell that a run was killed, so people must."""
+        with self._failing(_LOCK):
+            try:
+                self._put(_LOCK, platform.node().encode(), "create")
+            except FileExistsError as error:
+                owner = (self.read(_LOCK) or b"").decode(errors="replace")
+                raise RequestError(
+                    f"output folder {self}: a run on {owner or 'another machine'} is writing to "
+                    f"it; where that was killed, delete {self}/{_LOCK}"
+                ) from error
+        try:
+            yield
+        finally:
+            self.remove(_LOCK)
+
+    def _put(self, name: str, content: bytes, mode: str) -> None:
+        place = self._place(name)
+        self._system.makedirs(place.rpartition("/")[0], exist_ok=True)
+        self._system.pipe_file(place, content, mode=mode)
+
+    def _place(self, name: str) -> str:
+        return f"{self._root}/{name}"
+
+    @contextlib.contextmanager
+    def _failing(self, name: str) -> Iterator[None]:
+        try:
+            yield
+        except (RequestError, StoreError):
+            raise
+        except Exception as error:  # each file system has errors of its own
+            raise StoreError(f"{self}/{name}: {type(error).__name__}: {error}") from error
+
+
+@contextlib.contextmanager
+def local_copy(location: str | Path, names: Iterable[str]) -> Iterator[Path]:
+    """A folder of this machine to work in: the folder itself, or a copy that is written back.
+
+    Args:
+        location: a path, or a URL.
+        names: files that the copy needs.
+
+    Yields:
+        The path; what is written below it is kept in the folder when the block ends well.
+
+    Raises:
+        RequestError: as `open_folder`.
+        StoreError: where a file cannot be read or written.
+    """
+    if "://" not in str(location):
+        yield Path(location)
+        return
+    folder = open_folder(location)
+    with tempfile.TemporaryDirectory() as place:
+        copy = Path(place)
+        for name in names:
+            content = folder.read(name)
+            if content is not None:
+                (copy / name).write_bytes(content)
+        before = {path: path.stat().st_mtime_ns for path in copy.rglob("*")}
+        yield copy
+        for path in sorted(copy.rglob("*")):
+            if path.is_file() and path.stat().st_mtime_ns != before.get(path):
+                folder.write(path.relative_to(copy).as_posix(), path.read_bytes())

@@ -5,8 +5,10 @@ from pathlib import Path
 import polars as pl
 import tomli_w
 
-from qbumpers.experiments.design import make_experiment
-from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments.local import Threads
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.run import run_experiment
+from qbumpers.experiments.sources import make_experiment
 
 BUMPERS = {"name": "stochastic-q-bumpers", "alpha": [0.3, 0.7], "second": True}
 
@@ -38,7 +40,7 @@ def settings(**changes):
 
 def run_into(folder, *, workers=1, report=lambda progress: None, **changes):
     plan = make_plan(make_experiment(settings(**changes)))
-    run_experiment(plan, folder, workers=workers, report=report)
+    run_experiment(plan, folder, executor=Threads(workers), report=report)
     return Path(folder)
 
 
@@ -49,6 +51,12 @@ def rows_of(folder):
     return {
         tuple(row[key] for key in keys): tuple(row.values()) for row in table.iter_rows(named=True)
     }
+
+
+def ids_of(**changes):
+    """Ids of the conditions of an experiment, in its order."""
+    experiment = make_experiment(settings(**changes))
+    return [named.condition for named in experiment.conditions()]
 
 
 def cells_of(folder):

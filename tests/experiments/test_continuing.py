@@ -1,14 +1,17 @@
 """A run goes on from whatever is whole in its folder, and ends in the same bytes."""
 
+import contextlib
 import errno
 import os
+import tempfile
+from pathlib import Path
 
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.experiments import run as running
+from qbumpers.experiments import cells, work
 from qbumpers.experiments.store import load, open_store
-from qbumpers.files import StoreError
+from qbumpers.files import LocalFolder, StoreError
 from tests.experiments.examples import BUMPERS, cells_of, contents_of, rows_of, run_into
 
 TABLES = ("episodes.parquet", "states.parquet")
@@ -23,8 +26,8 @@ def simulated(monkeypatch):
         done.append((condition.assistant.name, *condition.assistant.options[:1], trials))
         return simulate(condition, trials=trials, seed=seed)
 
-    simulate = running.run_condition
-    monkeypatch.setattr(running, "run_condition", spy)
+    simulate = work.run_condition
+    monkeypatch.setattr(work, "run_condition", spy)
     return done
 
 
@@ -52,7 +55,7 @@ def test_a_folder_may_have_any_name(tmp_path, whole, simulated):
 def test_a_finished_run_reports_all_its_trials_at_once(folder):
     reports = []
     run_into(folder, report=reports.append)
-    assert reports == [(15, 15, 0)]
+    assert reports == [(15, 15, 0, 0.0, [])]
 
 
 def test_only_new_conditions_are_simulated(folder, simulated):
@@ -60,8 +63,28 @@ def test_only_new_conditions_are_simulated(folder, simulated):
     assert simulated == [("stochastic-q-bumpers", 0.5, range(5))]
 
 
+def test_only_new_learners_are_simulated(tmp_path, simulated):
+    none = {"assistants": [{"name": "none"}]}
+    run_into(tmp_path, learners=[{"perception": "observant"}], **none)
+    before = rows_of(tmp_path)
+    simulated.clear()
+    run_into(tmp_path, learners=[{"perception": ["transition", "observant"]}], **none)
+    assert simulated == [("none", range(5))]
+    after = [row for key, row in rows_of(tmp_path).items() if key[0].endswith("observant")]
+    assert [row[4:] for row in after] == [row[4:] for row in before.values()]
+
+
+@pytest.mark.parametrize("reading", [{"criterion": -20.0}, {"reproduces": "cliff-walking"}])
+def test_another_reading_of_the_results_simulates_nothing(folder, whole, simulated, reading):
+    run_into(folder, **reading)
+    assert simulated == []
+    assert contents_of(folder, *TABLES) == contents_of(whole, *TABLES)
+    found = load(folder).experiment.model_dump()
+    assert found.items() >= reading.items()
+
+
 def test_only_new_blocks_of_trials_are_simulated(tmp_path, monkeypatch, simulated):
-    monkeypatch.setattr(running, "BLOCK", 2)
+    monkeypatch.setattr(cells, "EPISODES_A_CELL", 2 * 4)
     run_into(tmp_path, trials=4, assistants=[{"name": "none"}])
     run_into(tmp_path, trials=8, assistants=[{"name": "none"}])
     blocks = [trials for _, trials in simulated]
@@ -69,7 +92,7 @@ def test_only_new_blocks_of_trials_are_simulated(tmp_path, monkeypatch, simulate
 
 
 def test_an_interrupted_run_keeps_its_finished_cells(tmp_path, monkeypatch, whole, simulated):
-    monkeypatch.setattr(running, "BLOCK", 2)
+    monkeypatch.setattr(cells, "EPISODES_A_CELL", 2 * 4)
 
     def interrupt(progress):
         if progress.trials >= 6:
@@ -90,7 +113,7 @@ def test_an_interrupted_run_keeps_its_finished_cells(tmp_path, monkeypatch, whol
 @pytest.mark.parametrize("kind", ["episodes", "states"])
 @pytest.mark.parametrize("damage", ["deleted", "emptied", "halved", "cut by a byte", "overwritten"])
 def test_a_damaged_cell_is_computed_again(folder, whole, simulated, kind, damage):
-    cell = next(path for path in cells_of(folder) if path.name.endswith(f"{kind}.parquet"))
+    cell = next(path for path in cells_of(folder) if f"-{kind}-" in path.name)
     content = cell.read_bytes()
     spoiled = {
         "emptied": b"",
@@ -103,8 +126,12 @@ def test_a_damaged_cell_is_computed_again(folder, whole, simulated, kind, damage
     else:
         cell.write_bytes(spoiled[damage])
     others = modified(path for path in cells_of(folder) if path.parent != cell.parent)
-    run_into(folder)
+    reports = []
+    run_into(folder, report=reports.append)
     assert len(simulated) == 1
+    assert (reports[0].trials, reports[-1].trials) == (10, 15)
+    named = [] if damage == "deleted" else [str(cell.relative_to(folder))]
+    assert {tuple(report.damaged) for report in reports} == {tuple(named)}
     assert modified(others) == others
     assert contents_of(folder, *TABLES, "cells/**/*") == contents_of(whole, *TABLES, "cells/**/*")
 
@@ -122,8 +149,8 @@ DIFFERENT = {
     "episodes": (6, "4", "6"),
     "name": ("other", "'small'", "'other'"),
     "values": ("q-learning", "'exact'", "'q-learning'"),
-    "reproduces": ("cliff-walking", "None", "'cliff-walking'"),
-    "learner": ({"perception": "observant"}, ".*transition.*", ".*observant.*"),
+    "retention": (2, "0", "2"),
+    "common_random_numbers": (True, "False", "True"),
     "task": (
         {"name": "FrozenLake-v1", "discount": 0.9},
         ".*'name': 'cliff-walking'.*",
@@ -164,6 +191,21 @@ def test_a_run_that_is_refused_does_not_change_the_design_of_the_one_that_writes
     assert (folder / "experiment.toml").read_bytes() == before
 
 
+def test_an_experiment_that_another_run_begins_just_before_is_left_alone(tmp_path, monkeypatch):
+    """The folder was empty when this run looked, and is another's when it comes to write."""
+    locked = LocalFolder.locked
+
+    def come_second(place):
+        monkeypatch.setattr(LocalFolder, "locked", locked)
+        run_into(tmp_path, seed=9)
+        return locked(place)
+
+    monkeypatch.setattr(LocalFolder, "locked", come_second)
+    with pytest.raises(RequestError, match=r"holds another experiment \(seed was 9, now 3\)"):
+        run_into(tmp_path)
+    assert load(tmp_path).experiment.seed == 9
+
+
 def test_a_file_is_no_output_folder(tmp_path):
     path = tmp_path / "results"
     path.write_text("mine")
@@ -174,8 +216,51 @@ def test_a_file_is_no_output_folder(tmp_path):
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(StoreError, match=r"cannot write .*file/out/experiment\.toml: Not a dir"):
+    with pytest.raises(StoreError, match=r"cannot write .*file/out/.*: Not a dir"):
         run_into(tmp_path / "file" / "out")
+
+
+@contextlib.contextmanager
+def without_privileges():
+    """Root may write anywhere; nobody may not."""
+    user = os.geteuid()
+    if user == 0:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        os.seteuid(user)
+
+
+@pytest.fixture
+def guarded():
+    """A folder that everybody may read and nobody but its owner may write."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        folder.chmod(0o555)
+        yield folder
+        folder.chmod(0o755)
+
+
+def test_a_folder_that_may_not_be_written_is_named(guarded):
+    with (
+        without_privileges(),
+        pytest.raises(StoreError, match=rf"cannot write {guarded}/out/.*: Permission denied"),
+    ):
+        run_into(guarded / "out")
+    assert list(guarded.iterdir()) == []
+
+
+@pytest.mark.parametrize("blocked", ["cells", "episodes.parquet", "states.parquet", "values.npz"])
+def test_what_stands_in_the_way_of_a_file_is_named(tmp_path, blocked, whole):
+    """A folder in the place of a file, or a file in the place of a folder."""
+    path = tmp_path / blocked
+    path.write_text("mine") if blocked == "cells" else path.mkdir()
+    with pytest.raises(StoreError, match=rf"cannot (write|read) {path}.*: (Is a|Not a|File ex)"):
+        run_into(tmp_path)
+    path.unlink() if blocked == "cells" else path.rmdir()
+    run_into(tmp_path)
+    assert contents_of(tmp_path, *TABLES) == contents_of(whole, *TABLES)
 
 
 def test_a_disk_that_fills_up_at_any_write_leaves_only_whole_files(tmp_path, whole, monkeypatch):

@@ -8,14 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers.assistants import make_assistant
-from qbumpers.experiments.design import (
-    AssistantDesign,
-    condition_id,
-    load_experiment,
-    make_experiment,
-)
+from qbumpers.experiments.design import AssistantDesign, condition_id
+from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.learners.q_learning import scheduled
-from tests.experiments.examples import settings
+from tests.experiments.examples import ids_of, settings
 
 EVERYTHING = """
 name = "my-lake_2.0"
@@ -23,6 +19,9 @@ reproduces = "cliff-walking"
 values = "q-learning"
 trials = 7
 episodes = 9
+retention = 3
+criterion = -20
+common_random_numbers = true
 seed = 11
 
 [task]
@@ -31,7 +30,7 @@ discount = 0.9
 episode_limit = 30
 arguments = { is_slippery = true, map_name = "8x8" }
 
-[learner]
+[[learners]]
 name = "q-learning"
 perception = "observant"
 discount = 0.8
@@ -52,8 +51,7 @@ p_max = 0.9
 
 
 def ids(*assistants):
-    experiment = make_experiment(settings(assistants=list(assistants)))
-    return [condition for condition, _ in experiment.named_assistants()]
+    return ids_of(assistants=list(assistants))
 
 
 def test_every_field_is_read_from_toml(tmp_path):
@@ -64,7 +62,9 @@ def test_every_field_is_read_from_toml(tmp_path):
     assert experiment.reproduces == "cliff-walking"
     assert experiment.values == "q-learning"
     assert (experiment.trials, experiment.episodes, experiment.seed) == (7, 9, 11)
-    task, learner = experiment.task, experiment.learner
+    assert (experiment.retention, experiment.common_random_numbers) == (3, True)
+    assert experiment.criterion == -20.0
+    task, [learner] = experiment.task, experiment.learners
     assert (task.name, task.discount, task.episode_limit) == ("FrozenLake-v1", 0.9, 30)
     assert task.arguments == {"is_slippery": True, "map_name": "8x8"}
     assert (learner.name, learner.perception) == ("q-learning", "observant")
@@ -87,8 +87,11 @@ def test_the_defaults_are_the_papers_learner():
     experiment = make_experiment(
         {"name": "x", "task": "cliff-walking", "assistants": [{"name": "none"}]}
     )
-    learner = experiment.learner.learner(task_discount=1.0)
-    assert experiment.learner.perception == "transition"
+    [design] = experiment.learners
+    learner = design.learner(task_discount=1.0)
+    assert (design.name, design.perception, design.penalty) == ("q-learning", "transition", 1.0)
+    assert (experiment.retention, experiment.criterion) == (0, None)
+    assert experiment.common_random_numbers is False
     assert (experiment.trials, experiment.episodes, experiment.values) == (100, 100, "exact")
     assert (learner.discount, learner.initial_value) == (1.0, 0.0)
     for schedule in (learner.epsilon, learner.learning_rate):
@@ -98,9 +101,9 @@ def test_the_defaults_are_the_papers_learner():
 
 
 def test_a_learner_has_the_tasks_discount_unless_told_otherwise():
-    assert make_experiment(settings()).learner.learner(0.75).discount == 0.75
-    own = make_experiment(settings(learner={"discount": 0.5}))
-    assert own.learner.learner(0.75).discount == 0.5
+    assert make_experiment(settings()).learners[0].learner(0.75).discount == 0.75
+    own = make_experiment(settings(learners=[{"discount": 0.5}]))
+    assert own.learners[0].learner(0.75).discount == 0.5
 
 
 def test_a_task_by_its_name_alone_is_a_task_without_arguments():
@@ -175,7 +178,7 @@ def test_ids_are_unique_and_say_what_they_stand_for(alphas, seconds):
 
 
 def test_assistants_are_those_of_the_registry():
-    [(_, made)] = make_experiment(
+    [named] = make_experiment(
         settings(assistants=[{"name": "stochastic-q-bumpers", "alpha": 0.7, "clip": False}])
-    ).named_assistants()
-    assert made == make_assistant("stochastic-q-bumpers", alpha=0.7, clip=False)
+    ).conditions()
+    assert named.assistant == make_assistant("stochastic-q-bumpers", alpha=0.7, clip=False)

@@ -3,8 +3,8 @@
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.experiments.design import load_experiment, make_experiment, reproduction
-from qbumpers.experiments.run import make_plan
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.sources import load_experiment, make_experiment, reproduction
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import solve
 from tests.experiments.examples import settings, write_toml
@@ -37,33 +37,36 @@ WRONG = {
         r"task\.episode_limits = 9: unknown field \(did you mean 'episode_limit'\?\)",
     ),
     "unknown field of the learner": (
-        {"learner": {"perceptoin": "transition"}},
-        r"learner\.perceptoin = 'transition': unknown field \(did you mean 'perception'\?\)",
+        {"learners": [{"perceptoin": "transition"}]},
+        r"learners\.0\.perceptoin = 'transition': unknown field \(did you mean 'perception'\?\)",
     ),
     "unknown field of a schedule": (
-        {"learner": {"epsilon": {"fractoin": 0.5}}},
-        r"learner\.epsilon\.fractoin = 0\.5: unknown field \(did you mean 'fraction'\?\)",
+        {"learners": [{"epsilon": {"fractoin": 0.5}}]},
+        r"learners\.0\.epsilon\.fractoin = 0\.5: unknown field \(did you mean 'fraction'\?\)",
     ),
-    "unknown learner": ({"learner": {"name": "sarsa"}}, r"learner\.name = 'sarsa': .*'q-learning'"),
+    "unknown learner": (
+        {"learners": [{"name": "sarsa"}]},
+        r"learners\.0\.name = 'sarsa': .*'q-learning'",
+    ),
     "unknown perception": (
-        {"learner": {"perception": "transitoin"}},
-        r"learner\.perception 'transitoin' \(did you mean 'transition'\?\)\. Known: .*observant",
+        {"learners": [{"perception": "transitoin"}]},
+        r"learners\.perception 'transitoin' \(did you mean 'transition'\?\)\. Known: .*observant",
     ),
     "fraction above 1": (
-        {"learner": {"epsilon": {"fraction": 1.5}}},
-        r"learner\.epsilon\.fraction = 1\.5: .*less than or equal to 1",
+        {"learners": [{"epsilon": {"fraction": 1.5}}]},
+        r"learners\.0\.epsilon\.fraction = 1\.5: .*less than or equal to 1",
     ),
     "learning rate that is no number": (
-        {"learner": {"learning_rate": {"end": float("nan")}}},
-        r"learner\.learning_rate\.end = nan: ",
+        {"learners": [{"learning_rate": {"end": float("nan")}}]},
+        r"learners\.0\.learning_rate\.end = nan: ",
     ),
     "infinite initial value": (
-        {"learner": {"initial_value": float("inf")}},
-        r"learner\.initial_value = inf: .*finite",
+        {"learners": [{"initial_value": float("inf")}]},
+        r"learners\.0\.initial_value = inf: .*finite",
     ),
     "discount of 0": (
-        {"learner": {"discount": 0.0}},
-        r"learner\.discount = 0\.0: .*greater than 0",
+        {"learners": [{"discount": 0.0}]},
+        r"learners\.0\.discount = 0\.0: .*greater than 0",
     ),
     "discount above 1": (
         {"task": {"name": "Taxi-v4", "discount": 1.01}},

@@ -2,8 +2,9 @@
 
 import pytest
 
-from qbumpers.experiments.design import PROFILES, reproduction, reproductions
-from qbumpers.experiments.run import make_plan
+from qbumpers.experiments.design import reproductions
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.sources import PROFILES, reproduction
 
 # Figure 2: the settings of both methods, as the paper lists them.
 THRESHOLDS = [
@@ -35,9 +36,10 @@ def test_there_is_one_published_experiment():
 def test_a_profile_holds_the_26_conditions_of_figure_2(profile):
     experiment = reproduction("cliff-walking", profile)
     assert len(FIGURE_2) == 26
-    assert [condition for condition, _ in experiment.named_assistants()] == FIGURE_2
-    for condition, assistant in experiment.named_assistants():
+    assert [named.condition for named in experiment.conditions()] == FIGURE_2
+    for condition, assistant, _, learner_id in experiment.conditions():
         options = assistant.options._asdict()
+        assert learner_id == "q-learning"
         assert condition.partition("=")[2] in ("", f"{options.get('alpha', 0):g}")
         if assistant.name == "local-q-thresholding":
             assert options["second"] is True
@@ -69,8 +71,8 @@ def test_the_profiles_differ_in_the_decay_escalation_and_clipping_alone():
     }
     assert differing == {
         ".name": ("cliff-walking", "cliff-walking-text"),
-        ".learner.epsilon.fraction": (0.9, 0.1),
-        ".learner.learning_rate.fraction": (0.9, 0.1),
+        ".learners.0.epsilon.fraction": (0.9, 0.1),
+        ".learners.0.learning_rate.fraction": (0.9, 0.1),
         ".assistants.3.escalate": (True, False),
         ".assistants.3.clip": (True, False),
     }

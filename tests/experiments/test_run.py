@@ -1,7 +1,9 @@
 """What a run writes, and that its numbers depend on nothing but the experiment."""
 
+import os
 import platform
 import tomllib
+from importlib.metadata import version
 
 import numpy as np
 import polars as pl
@@ -10,9 +12,9 @@ import pytest
 import qbumpers
 from qbumpers.assistants import make_assistant
 from qbumpers.errors import RequestError
-from qbumpers.experiments import run as running
-from qbumpers.experiments.design import load_experiment, make_experiment
-from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments import cells
+from qbumpers.experiments.local import Threads
+from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.simulation import simulate
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import load_values, solve
@@ -21,15 +23,16 @@ from tests.experiments.examples import (
     LAKE,
     cells_of,
     contents_of,
+    ids_of,
     rows_of,
     run_into,
     settings,
 )
 
 EPISODE_COLUMNS = [
-    "condition", "assistant", "alpha", "trial", "episode", "assisted_return", "unassisted_return",
-    "assisted_length", "unassisted_length", "overrides", "assisted_success", "unassisted_success",
-    "assisted_crash", "unassisted_crash",
+    "condition", "assistant", "alpha", "learner", "trial", "episode", "retention",
+    "assisted_return", "unassisted_return", "assisted_length", "unassisted_length", "overrides",
+    "assisted_success", "unassisted_success", "assisted_crash", "unassisted_crash",
 ]  # fmt: skip
 NAMES = ["none", "stochastic-q-bumpers/alpha=0.3", "stochastic-q-bumpers/alpha=0.7"]
 THRESHOLDS = {"name": "local-q-thresholding", "alpha": 0.0195, "second": True}
@@ -43,7 +46,7 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def small_blocks(monkeypatch):
     """Two trials a cell, so that five trials make three cells of a condition."""
-    monkeypatch.setattr(running, "BLOCK", 2)
+    monkeypatch.setattr(cells, "EPISODES_A_CELL", 2 * 4)
 
 
 def test_a_run_writes_its_design_cells_tables_and_values(folder):
@@ -62,8 +65,11 @@ def test_a_run_writes_its_design_cells_tables_and_values(folder):
 def test_the_design_as_run_can_be_run_again_and_says_where_it_ran(folder):
     assert load_experiment(folder / "experiment.toml") == make_experiment(settings())
     written = tomllib.loads((folder / "experiment.toml").read_text(encoding="utf-8"))
-    assert written["learner"]["epsilon"] == {"start": 1.0, "end": 0.02, "fraction": 0.9}
+    assert written["learners"][0]["epsilon"] == {"start": 1.0, "end": 0.02, "fraction": 0.9}
+    libraries = ("numpy", "numba", "scipy", "polars")
     assert written["run"] == {
+        "format": 2,
+        **{name: version(name) for name in libraries},
         "version": qbumpers.__version__,
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -75,10 +81,11 @@ def test_there_is_a_row_an_episode_in_the_order_of_the_experiment(folder):
     assert table.columns == EPISODE_COLUMNS
     keys = table.select("condition", "trial", "episode").rows()
     assert keys == [(name, t, e) for name in NAMES for t in range(5) for e in range(4)]
-    assert table.select("assistant", "alpha").unique(maintain_order=True).rows() == [
-        ("none", None),
-        ("stochastic-q-bumpers", 0.3),
-        ("stochastic-q-bumpers", 0.7),
+    labels = table.select("assistant", "alpha", "learner", "retention")
+    assert labels.unique(maintain_order=True).rows() == [
+        ("none", None, "q-learning", False),
+        ("stochastic-q-bumpers", 0.3, "q-learning", False),
+        ("stochastic-q-bumpers", 0.7, "q-learning", False),
     ]
 
 
@@ -88,14 +95,14 @@ def test_the_rows_are_those_of_the_simulation(folder):
     rows = rows_of(folder)
     for trial, episode in np.ndindex(5, 4):
         expected = [
-            getattr(outcomes, column)[trial, episode].item() for column in EPISODE_COLUMNS[5:10]
+            getattr(outcomes, column)[trial, episode].item() for column in EPISODE_COLUMNS[7:12]
         ]
         assisted = int(outcomes.assisted_events[trial, episode])
         unassisted = int(outcomes.unassisted_events[trial, episode])
         # Bits of an episode's events: 2 a success, 4 a crash.
         expected += [bool(assisted & 2), bool(unassisted & 2), bool(assisted & 4)]
         expected += [bool(unassisted & 4)]
-        assert rows[NAMES[1], trial, episode][5:] == tuple(expected)
+        assert rows[NAMES[1], trial, episode][7:] == tuple(expected)
 
 
 def test_success_and_crash_are_what_returns_say_they_are(tmp_path):
@@ -116,8 +123,8 @@ def test_success_and_crash_are_unknown_where_the_task_knows_none(tmp_path):
     task = {"name": "CliffWalking-v1", "discount": 0.9, "episode_limit": 20}
     run_into(tmp_path, task=task, assistants=[{"name": "none"}])
     table = pl.read_parquet(tmp_path / "episodes.parquet")
-    assert [c for c in table.columns if table[c].null_count()] == ["alpha", *EPISODE_COLUMNS[10:]]
-    assert all(table[column].dtype == pl.Boolean for column in EPISODE_COLUMNS[10:])
+    assert [c for c in table.columns if table[c].null_count()] == ["alpha", *EPISODE_COLUMNS[12:]]
+    assert all(table[column].dtype == pl.Boolean for column in EPISODE_COLUMNS[12:])
 
 
 def test_steps_by_state_add_up_to_lengths_and_overrides(folder):
@@ -190,8 +197,8 @@ def test_conditions_can_come_and_go_without_changing_the_others(
     shared = before.keys() & after.keys()
     assert {key[0] for key in shared} >= set(NAMES[1:])
     assert {key: before[key] for key in shared} == {key: after[key] for key in shared}
-    named = make_experiment(settings(assistants=assistants)).named_assistants()
-    assert [key[0] for key in after] == [name for name, _ in named for _ in range(5 * 4)]
+    names = ids_of(assistants=assistants)
+    assert [key[0] for key in after] == [name for name in names for _ in range(5 * 4)]
 
 
 @pytest.mark.parametrize("same_folder", [True, False], ids=["continued", "afresh"])
@@ -225,12 +232,47 @@ def test_progress_counts_trials_from_nothing_to_all(tmp_path, small_blocks):
     assert reports[-1].steps == steps
 
 
+def test_episodes_alone_follow_those_with_the_assistant(tmp_path):
+    table = pl.read_parquet(run_into(tmp_path, retention=3) / "episodes.parquet")
+    episodes = table.group_by("condition", "trial", maintain_order=True).agg("episode", "retention")
+    assert episodes["episode"].to_list() == [list(range(7))] * 3 * 5
+    assert episodes["retention"].to_list() == [[False] * 4 + [True] * 3] * 3 * 5
+    assert table.filter("retention")["overrides"].to_list() == [0] * 3 * 5 * 3
+    helped = table.filter(~pl.col("retention"))
+    states = pl.read_parquet(tmp_path / "states.parquet")
+    for who in ("assisted", "unassisted"):
+        steps = helped.group_by("condition", maintain_order=True).agg(pl.sum(f"{who}_length"))
+        counted = states.group_by("condition", maintain_order=True).agg(pl.sum(who))
+        assert counted.rows() == steps.rows()
+    without = pl.read_parquet(run_into(tmp_path / "without") / "episodes.parquet")
+    assert helped.equals(without)
+
+
+def test_trials_that_share_numbers_are_those_of_the_simulation(tmp_path):
+    run_into(tmp_path, common_random_numbers=True, trials=3)
+    rows = pl.read_parquet(tmp_path / "episodes.parquet")
+    for name, assistant in [
+        ("none", make_assistant("none")),
+        (NAMES[2], make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)),
+    ]:
+        outcomes = simulate(
+            cliff_walking(), assistant, episodes=4, trials=3, seed=3, common_random_numbers=True
+        ).outcomes
+        found = rows.filter(pl.col("condition") == name)
+        assert found["assisted_return"].to_list() == outcomes.assisted_return.ravel().tolist()
+        assert found["unassisted_return"].to_list() == outcomes.unassisted_return.ravel().tolist()
+
+
 @pytest.mark.parametrize("workers", [0, -2])
 def test_fewer_than_one_worker_is_refused(tmp_path, workers):
-    plan = make_plan(make_experiment(settings()))
     with pytest.raises(RequestError, match=rf"workers = {workers}; at least 1"):
-        run_experiment(plan, tmp_path / "none", workers=workers)
+        run_into(tmp_path / "none", workers=workers)
     assert not (tmp_path / "none").exists()
+
+
+def test_all_cores_are_used_unless_fewer_are_asked_for():
+    assert Threads().cores == os.cpu_count()
+    assert Threads(3).cores == 3
 
 
 @pytest.mark.parametrize("values", ["exact", "q-learning", "file"])
@@ -245,10 +287,10 @@ def test_the_assistants_values_come_from_where_the_experiment_says(tmp_path, val
 
 
 def test_other_tasks_and_learners_reach_the_simulation(tmp_path):
-    lake = run_into(tmp_path / "lake", **LAKE, learner={"perception": "observant"})
+    lake = run_into(tmp_path / "lake", **LAKE, learners=[{"perception": "observant"}])
     table = pl.read_parquet(lake / "episodes.parquet")
     assert set(table["assisted_return"].unique()) <= {0.0, 1.0}
-    other = run_into(tmp_path / "other", **LAKE, learner={"perception": "interruption"})
+    other = run_into(tmp_path / "other", **LAKE, learners=[{"perception": "interruption"}])
     untouched = pl.col("condition") == "none"
     ours, theirs = table, pl.read_parquet(other / "episodes.parquet")
     assert not ours.filter(~untouched).equals(theirs.filter(~untouched))

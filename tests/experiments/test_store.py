@@ -4,11 +4,11 @@ import polars as pl
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.experiments.design import make_experiment
+from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.store import load, run_description
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import solve
-from tests.experiments.examples import run_into, settings
+from tests.experiments.examples import BUMPERS, run_into, settings
 
 
 def test_a_finished_run_loads_as_it_was_run(whole):
@@ -17,7 +17,8 @@ def test_a_finished_run_loads_as_it_was_run(whole):
     assert results.episodes.equals(pl.read_parquet(whole / "episodes.parquet"))
     assert results.states.equals(pl.read_parquet(whole / "states.parquet"))
     assert results.values.digest() == solve(cliff_walking()).digest()
-    assert set(run_description(whole)) == {"version", "python", "platform"}
+    libraries = {"numpy", "numba", "scipy", "polars"}
+    assert set(run_description(whole)) == {"format", "version", "python", "platform"} | libraries
 
 
 def test_a_folder_without_a_design_is_named(tmp_path):
@@ -55,7 +56,17 @@ def test_a_design_edited_by_hand_is_checked(folder):
         load(folder)
 
 
-@pytest.mark.parametrize("changes", [{"trials": 8}, {"assistants": [{"name": "maximal"}]}])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"trials": 8},
+        {"assistants": [{"name": "maximal"}]},
+        # The ids stay: an option that all of a kind share, and a learner alone, are not in them.
+        {"assistants": [{"name": "none"}, {**BUMPERS, "second": False}]},
+        {"learners": [{"perception": "observant"}]},
+    ],
+    ids=["trials", "assistants", "options", "learner"],
+)
 def test_tables_older_than_the_design_are_not_taken_for_its_results(folder, changes):
     def stop(progress):
         raise KeyboardInterrupt

@@ -1,16 +1,17 @@
 """What an experiment is: data, in a TOML file or as the same model in Python."""
 
 import itertools
-import tomllib
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from importlib import resources
-from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qbumpers.assistants import Assistant, make_assistant
-from qbumpers.errors import RequestError, from_validation, unknown_name
+from qbumpers.errors import RequestError, unknown_name
+from qbumpers.experiments.cells import MANY_CELLS
 from qbumpers.learners import PERCEPTIONS, QLearner, Schedule
 
 Value = bool | int | float | str
@@ -45,7 +46,7 @@ class ScheduleDesign(_Model):
 
 
 class LearnerDesign(_Model):
-    """The simulated person.
+    """A simulated person. In a file, a field given as a list is swept over.
 
     Attributes:
         name: "q-learning".
@@ -85,43 +86,43 @@ class AssistantDesign(_Model):
 
     def assistants(self) -> list[Assistant]:
         """One assistant for each combination of listed options, the last option fastest."""
-        options: dict[str, Any] = self.model_extra or {}
-        lists = [value if isinstance(value, list) else [value] for value in options.values()]
-        for option, values in zip(options, lists, strict=True):
-            if not values:
-                raise RequestError(
-                    f"assistant {self.name}: {option} = []; at least one value is needed"
-                )
-        return [
-            make_assistant(self.name, **dict(zip(options, values, strict=True)))
-            for values in itertools.product(*lists)
-        ]
+        combinations = swept(self.model_extra or {}, f"assistant {self.name}")
+        return [make_assistant(self.name, **options) for options in combinations]
 
 
-class NamedAssistant(NamedTuple):
-    """An assistant of an experiment under its readable id.
+class NamedCondition(NamedTuple):
+    """A condition of an experiment: one assistant with one set of options, and one learner.
 
     Attributes:
-        condition: the id, for instance "stochastic-q-bumpers/alpha=0.7".
+        condition: its readable id, for instance "stochastic-q-bumpers/alpha=0.7"; with
+            "@perception=observant" at its end where the experiment has several learners.
         assistant: the assistant.
+        learner: the simulated person.
+        learner_id: the learner's readable id, for instance "q-learning".
     """
 
     condition: str
     assistant: Assistant
+    learner: LearnerDesign
+    learner_id: str
 
 
 class Experiment(_Model):
-    """An experiment: one task, one learner, and the assistants to compare.
+    """An experiment: one task, the assistants to compare, and the people who learn with them.
 
     Attributes:
         name: of the experiment, and of its default output folder.
         reproduces: the published experiment to be compared with, for instance "cliff-walking".
         task: which task, as a table or just its name.
         values: Q* of the assistants: "exact", "q-learning", or the path of a values file.
-        learner: the simulated person.
-        assistants: what to compare; one condition for each combination of listed options.
+        learners: the simulated people; every assistant meets each of them.
+        assistants: what to compare; one for each combination of listed options.
         trials: people a condition.
         episodes: assisted episodes a trial, each followed by a greedy one without help.
+        retention: further episodes in which people go on without the assistant.
+        criterion: return without help that counts as having learned, in reward units.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition,
+            so that conditions can be compared trial by trial.
         seed: of all random streams.
     """
 
@@ -129,24 +130,96 @@ class Experiment(_Model):
     reproduces: str | None = None
     task: TaskDesign
     values: str = "exact"
-    learner: LearnerDesign = LearnerDesign()
+    learners: Annotated[list[LearnerDesign], Field(min_length=1)] = [LearnerDesign()]
     assistants: Annotated[list[AssistantDesign], Field(min_length=1)]
     trials: Annotated[int, Field(ge=1)] = 100
     episodes: Annotated[int, Field(ge=1)] = 100
+    retention: Annotated[int, Field(ge=0)] = 0
+    criterion: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    common_random_numbers: bool = False
     seed: Annotated[int, Field(ge=0)] = 0
 
-    def named_assistants(self) -> list[NamedAssistant]:
-        """The conditions, in the order of the file.
+    @model_validator(mode="before")
+    @classmethod
+    def _spelt_out(cls, settings: Any) -> Any:
+        """A task given by its name, and learners with listed fields, in full."""
+        if not isinstance(settings, dict):
+            return settings
+        settings = dict(settings)
+        if isinstance(settings.get("task"), str):
+            settings["task"] = {"name": settings["task"]}
+        learners = settings.get("learners")
+        if isinstance(learners, list):
+            many = sum(combinations(each) for each in learners if isinstance(each, dict))
+            if many > MANY_CELLS:
+                raise RequestError(f"learners: {many:,} of them; at most {MANY_CELLS:,} are taken")
+            settings["learners"] = [
+                each
+                for learner in learners
+                for each in (swept(learner, "learner") if isinstance(learner, dict) else [learner])
+            ]
+        return settings
+
+    @model_validator(mode="after")
+    def _known_names(self) -> "Experiment":
+        for learner in self.learners:
+            if learner.perception not in PERCEPTIONS:
+                raise unknown_name("learners.perception", learner.perception, PERCEPTIONS)
+        if self.reproduces is not None and self.reproduces not in reproductions():
+            raise unknown_name("reproduces", self.reproduces, reproductions())
+        return self
+
+    def condition_count(self) -> int:
+        """How many conditions there are, counted without making them."""
+        options = [assistant.model_extra or {} for assistant in self.assistants]
+        return len(self.learners) * sum(map(combinations, options))
+
+    def conditions(self) -> list[NamedCondition]:
+        """The conditions, learner by learner, in the order of the file.
 
         Raises:
             RequestError: where an assistant or option is wrong, or a condition occurs twice.
         """
         assistants = [a for design in self.assistants for a in design.assistants()]
-        names = [condition_id(assistant, assistants) for assistant in assistants]
-        for name in names:
-            if names.count(name) > 1:
-                raise RequestError(f"condition {name} occurs {names.count(name)} times; keep one")
-        return [NamedAssistant(n, a) for n, a in zip(names, assistants, strict=True)]
+        everyone = [
+            NamedCondition(
+                condition_id(assistant, assistants) + _apart(learner, self.learners, "@"),
+                assistant,
+                learner,
+                learner.name + _apart(learner, self.learners, "/"),
+            )
+            for learner in self.learners
+            for assistant in assistants
+        ]
+        for name, times in Counter(named.condition for named in everyone).items():
+            if times > 1:
+                raise RequestError(f"condition {name} occurs {times} times; keep one")
+        return everyone
+
+
+def combinations(options: Mapping[str, Any]) -> int:
+    """How many combinations `swept` makes."""
+    return math.prod(len(value) for value in options.values() if isinstance(value, list))
+
+
+def swept(options: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
+    """Every combination of listed options.
+
+    Args:
+        options: by name; lists are swept over.
+        where: for messages, for instance "assistant stochastic-q-bumpers".
+
+    Returns:
+        Options by name, the last listed one changing fastest.
+
+    Raises:
+        RequestError: where a list is empty.
+    """
+    for option, values in options.items():
+        if values == []:
+            raise RequestError(f"{where}: {option} = []; at least one value is needed")
+    lists = [value if isinstance(value, list) else [value] for value in options.values()]
+    return [dict(zip(options, values, strict=True)) for values in itertools.product(*lists)]
 
 
 def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
@@ -170,74 +243,26 @@ def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
     return "/".join([assistant.name, ",".join(shown)]) if shown else assistant.name
 
 
+def _apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> str:
+    """What tells a learner from the others, after a mark; nothing where it is alone."""
+    if len(among) == 1:
+        return ""
+    fields = learner.model_dump()
+    others = [other.model_dump() for other in among]
+    shown = [
+        f"{field}={_written(value)}"
+        for field, value in fields.items()
+        if any(other[field] != value for other in others)
+    ]
+    return mark + ",".join(shown)
+
+
 def _written(value: Any) -> str:
+    if isinstance(value, dict):  # a schedule
+        return "..".join(_written(part) for part in value.values())
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
-
-
-def make_experiment(settings: dict[str, Any], where: str = "experiment") -> Experiment:
-    """An experiment from plain data, checked.
-
-    Args:
-        settings: what a TOML file would hold.
-        where: for messages, for instance the path of the file.
-
-    Returns:
-        The experiment.
-
-    Raises:
-        RequestError: naming each field that is wrong, its value and what is allowed.
-    """
-    task = settings.get("task")
-    if isinstance(task, str):
-        settings = {**settings, "task": {"name": task}}
-    try:
-        experiment = Experiment.model_validate(settings)
-    except ValidationError as error:
-        raise from_validation(error, where, _field_names()) from error
-    if experiment.learner.perception not in PERCEPTIONS:
-        raise unknown_name(
-            f"{where}: learner.perception", experiment.learner.perception, PERCEPTIONS
-        )
-    if experiment.reproduces is not None and experiment.reproduces not in reproductions():
-        raise unknown_name(f"{where}: reproduces", experiment.reproduces, reproductions())
-    try:
-        experiment.named_assistants()
-    except RequestError as error:
-        raise RequestError(f"{where}: {error}") from error
-    return experiment
-
-
-def _field_names() -> list[str]:
-    models = (Experiment, TaskDesign, LearnerDesign, ScheduleDesign)
-    return sorted({field for model in models for field in model.model_fields})
-
-
-def load_experiment(path: str | Path) -> Experiment:
-    """An experiment from a TOML file.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The experiment.
-
-    Raises:
-        RequestError: where the file cannot be read, is no TOML, or a field is wrong.
-    """
-    try:
-        settings = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RequestError(f"experiment file {path}: {error.strerror or error}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RequestError(f"experiment file {path}: not valid TOML: {error}") from error
-    settings.pop("run", None)  # what an output folder adds: version, platform, time
-    return make_experiment(settings, f"experiment file {path}")
-
-
-PROFILES = ("figures", "text")
-"""Readings of the paper: what reproduces its numbers, and what its text literally says."""
 
 
 def reproductions() -> list[str]:
@@ -250,27 +275,3 @@ def reproductions() -> list[str]:
             if file.name.endswith(".figures.toml")
         }
     )
-
-
-def reproduction(name: str, profile: str = "figures", **changes: Any) -> Experiment:
-    """A published experiment.
-
-    Args:
-        name: for instance "cliff-walking".
-        profile: "figures" or "text", see `PROFILES`.
-        **changes: of fields, for instance `trials=20`; None leaves a field as it is.
-
-    Returns:
-        The experiment.
-
-    Raises:
-        RequestError: where a name is unknown or a change is wrong.
-    """
-    if name not in reproductions():
-        raise unknown_name("reproduction", name, reproductions())
-    if profile not in PROFILES:
-        raise unknown_name("profile", profile, PROFILES)
-    file = resources.files("qbumpers.experiments") / "built_in" / f"{name}.{profile}.toml"
-    settings = tomllib.loads(file.read_text(encoding="utf-8"))
-    settings.update({field: value for field, value in changes.items() if value is not None})
-    return make_experiment(settings, f"{name}, profile {profile}")

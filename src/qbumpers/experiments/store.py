@@ -1,22 +1,25 @@
 """Results in a folder: written atomically, never computed twice, read by the analysis."""
 
 import contextlib
+import hashlib
+import importlib.metadata
 import io
 import platform
-import tomllib
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import filelock
 import polars as pl
 import tomli_w
 
 import qbumpers
 from qbumpers.errors import RequestError
-from qbumpers.experiments.design import Experiment, load_experiment
-from qbumpers.files import LEFT_BEHIND, StoreError, write_atomically
-from qbumpers.values import TabularValues, load_values
+from qbumpers.experiments.cells import Cell
+from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experiments.sources import make_experiment, parsed
+from qbumpers.files import Folder, StoreError, open_folder
+from qbumpers.values import TabularValues, decoded_values
 
 EXPERIMENT, EPISODES, STATES, VALUES = (
     "experiment.toml",
@@ -26,23 +29,23 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
 )
 """Files of an output folder; design and platform, a row an episode, a row a state, Q*."""
 
-_GROWING = {"trials", "assistants"}  # an experiment may be continued with more of these
+TABLES = (STATES, EPISODES)
+"""What a finished cell holds; in the order of writing."""
 
+NEEDED = (EXPERIMENT, EPISODES, STATES, VALUES)
+"""What the analysis reads."""
 
-class Cell(NamedTuple):
-    """A block of trials of one condition.
+FORMAT = 2
+"""Of an output folder: what its files are called and hold."""
 
-    Attributes:
-        condition: its readable id.
-        content: digest of everything that decides its numbers.
-        first: the first trial.
-        trials: how many.
-    """
+_FILE = re.compile(
+    r"(?P<first>\d+)-(?P<trials>\d+)-(?P<kind>\w+)-(?P<digest>[0-9a-f]{16})\.parquet"
+)
 
-    condition: str
-    content: str
-    first: int
-    trials: int
+# An experiment may be continued with more or fewer of the first three, and be read in another way.
+_CHANGING = {"trials", "assistants", "learners", "criterion", "reproduces"}
+
+_LIBRARIES = ("numpy", "numba", "scipy", "polars")
 
 
 class Results(NamedTuple):
@@ -61,59 +64,127 @@ class Results(NamedTuple):
     values: TabularValues
 
 
+class Survey(NamedTuple):
+    """What finished work an output folder holds.
+
+    Attributes:
+        cells: whole cells, by their content.
+        damaged: names of files that did not hold what was once written; they are gone.
+    """
+
+    cells: dict[str, list[Cell]]
+    damaged: list[str]
+
+
 class Store:
     """The output folder of one experiment; `open_store` opens it.
 
+    The file of a cell's table is named by the cell and by a digest of its bytes, so that damage
+    shows wherever it is.
+
     Args:
-        folder: of the results.
+        folder: of the results, locked.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Folder) -> None:
+        self._folder = folder
+        self._files: dict[tuple[Cell, str], str] = {}
 
-    def finished(self, cell: Cell) -> bool:
-        """Whether a cell is there and whole."""
-        try:
-            for kind in (EPISODES, STATES):
-                with self._path(cell, kind).open("rb") as file:
-                    pl.read_parquet_schema(file)
-        except (OSError, pl.exceptions.PolarsError):
-            return False
-        return True
+    def survey(self, contents: Iterable[str]) -> Survey:
+        """Look for finished cells, check them, and clear damaged files away.
 
-    def write(self, cell: Cell, episodes: pl.DataFrame, states: pl.DataFrame) -> None:
-        """Keep the results of a cell; the file of episodes, written last, says that it is whole."""
-        for kind, frame in ((STATES, states), (EPISODES, episodes)):
-            _write_table(self._path(cell, kind), frame)
+        Args:
+            contents: of the conditions that are wanted.
+
+        Returns:
+            What there is.
+        """
+        cells, damaged = {}, []
+        for content in contents:
+            kinds: dict[Cell, set[str]] = {}
+            for file in self._folder.names(_place(content)):
+                name = _FILE.fullmatch(file.rpartition("/")[2])
+                if name is None:
+                    continue
+                if _digest(self._folder.read(file) or b"") != name["digest"]:
+                    damaged.append(file)
+                    self._folder.remove(file)
+                    continue
+                cell = Cell(content, int(name["first"]), int(name["trials"]))
+                kind = f"{name['kind']}.parquet"
+                self._files[cell, kind] = file
+                kinds.setdefault(cell, set()).add(kind)
+            cells[content] = [cell for cell, found in kinds.items() if found == set(TABLES)]
+        return Survey(cells, damaged)
+
+    def write(self, cell: Cell, files: Mapping[str, bytes]) -> None:
+        """Keep the tables of a cell, encoded, by kind; it is whole when all are there."""
+        for kind, content in files.items():
+            stem = f"{cell.first:06d}-{cell.trials}-{kind.removesuffix('.parquet')}"
+            name = f"{_place(cell.content)}/{stem}-{_digest(content)}.parquet"
+            self._folder.write(name, content)
+            self._files[cell, kind] = name
 
     def write_values(self, values: TabularValues) -> None:
         """Keep the assistants' Q*."""
-        values.save(self.folder / VALUES)
+        self._folder.write(VALUES, values.encoded())
 
-    def assemble(self, cells: list[Cell]) -> None:
-        """Write the tables of the whole experiment from its finished cells."""
-        for kind in (EPISODES, STATES):
-            parts = [
-                pl.read_parquet(self._path(cell, kind), glob=False).select(
-                    pl.lit(cell.condition).alias("condition"), pl.all()
-                )
+    def assemble(self, parts: Iterable[tuple[NamedCondition, Sequence[Cell]]]) -> None:
+        """Write the tables of the whole experiment from its finished cells.
+
+        Args:
+            parts: the cells of each condition, in the order of their trials.
+
+        Raises:
+            StoreError: where a cell cannot be read, or a table cannot be written.
+        """
+        parts = list(parts)
+        for kind in TABLES:
+            table = pl.concat(
+                self.read(cell, kind).select(*_labels(named, kind), pl.all())
+                for named, cells in parts
                 for cell in cells
-            ]
-            table = pl.concat(parts)
+            )
             if kind == STATES:
                 keys = ["condition", "state", "row", "column"]
                 table = table.group_by(keys, maintain_order=True).sum()
-            _write_table(self.folder / kind, table)
+            self._folder.write(kind, encoded(table))
 
-    def _path(self, cell: Cell, kind: str) -> Path:
-        return self.folder / "cells" / cell.content[:16] / f"{cell.first:06d}-{cell.trials}-{kind}"
+    def read(self, cell: Cell, kind: str) -> pl.DataFrame:
+        """A table of a cell that was written or surveyed; StoreError where it is damaged."""
+        name = self._files[cell, kind]
+        content = self._folder.read(name) or b""
+        if f"-{_digest(content)}." not in name:
+            raise StoreError(f"{name} was changed while the run went on; run it again to mend it")
+        return pl.read_parquet(io.BytesIO(content))
 
 
-def _write_table(path: Path, table: pl.DataFrame) -> None:
-    # Through memory: Polars' own message about a full disk does not say so.
+def encoded(table: pl.DataFrame) -> bytes:
+    """A table as the bytes of a Parquet file."""
     buffer = io.BytesIO()
     table.write_parquet(buffer)
-    write_atomically(path, lambda temporary: temporary.write_bytes(buffer.getvalue()))
+    return buffer.getvalue()
+
+
+def _place(content: str) -> str:
+    return f"cells/{content[:16]}"
+
+
+def _labels(named: NamedCondition, kind: str) -> list[pl.Expr]:
+    """Columns that say whose rows these are."""
+    labels = [pl.lit(named.condition).alias("condition")]
+    if kind == EPISODES:
+        alpha = named.assistant.options._asdict().get("alpha")
+        labels += [
+            pl.lit(named.assistant.name).alias("assistant"),
+            pl.lit(alpha, pl.Float64).alias("alpha"),
+            pl.lit(named.learner_id).alias("learner"),
+        ]
+    return labels
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 @contextlib.contextmanager
@@ -121,7 +192,7 @@ def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
     """Open an output folder for one run, which alone writes to it.
 
     Args:
-        folder: of the results; made where it is missing.
+        folder: of the results, a path or a URL; made where it is missing.
         experiment: to be run, or continued.
 
     Yields:
@@ -132,61 +203,52 @@ def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
             writing to it.
         StoreError: where it cannot be written.
     """
-    folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise RequestError(f"output folder {folder}: it is a file")
-    _check_same(folder, experiment)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = filelock.FileLock(folder / ".lock").acquire(timeout=0)
-    except filelock.Timeout as error:
-        raise RequestError(
-            f"output folder {folder}: another run is writing to it; wait for it, or choose another "
-            "folder"
-        ) from error
-    except OSError as error:
-        raise StoreError(
-            f"cannot write {folder / EXPERIMENT}: {error.strerror or error}"
-        ) from error
-    with lock:
-        write_atomically(folder / EXPERIMENT, lambda path: path.write_text(_described(experiment)))
-        for left in folder.rglob(LEFT_BEHIND):
-            left.unlink(missing_ok=True)
-        yield Store(folder)
+    place = open_folder(folder)
+    with place.locked():
+        found = _read_design(place)
+        if found is not None:
+            _check_same(place, found, experiment)
+            if _renamed(found, experiment):  # or a stopped run would pass old rows off as its own
+                for table in TABLES:
+                    place.remove(table)
+        place.write(EXPERIMENT, _described(experiment).encode())
+        yield Store(place)
 
 
 def load(folder: str | Path) -> Results:
-    """What an output folder holds.
+    """What an output folder holds, as Polars frames.
 
     Args:
-        folder: of a finished run.
+        folder: of a finished run, a path or a URL.
 
     Returns:
         The experiment and its tables.
 
     Raises:
-        RequestError: where the folder is not one of a finished run.
+        RequestError: where the folder is not one of a finished run, or damaged.
     """
-    folder = Path(folder)
-    if not (folder / EXPERIMENT).is_file():
+    place = open_folder(folder)
+    experiment = _read_design(place)
+    if experiment is None:
         raise RequestError(f"results folder {folder}: it holds no {EXPERIMENT}")
-    experiment = load_experiment(folder / EXPERIMENT)
-    if not (folder / EPISODES).is_file():
-        raise _unfinished(folder)
+    tables = [place.read(name) for name in (EPISODES, STATES)]
+    if None in tables:
+        raise _unfinished(place)
     try:
-        episodes, states = (pl.read_parquet(folder / f, glob=False) for f in (EPISODES, STATES))
-    except (OSError, pl.exceptions.PolarsError) as error:
+        episodes, states = (pl.read_parquet(io.BytesIO(table or b"")) for table in tables)
+    except pl.exceptions.PolarsError as error:
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
-    conditions = {named.condition for named in experiment.named_assistants()}
-    rows = len(conditions) * experiment.trials * experiment.episodes
+    conditions = {named.condition for named in experiment.conditions()}
+    rows = len(conditions) * experiment.trials * (experiment.episodes + experiment.retention)
     if episodes.height != rows or set(episodes["condition"].unique()) != conditions:
-        raise _unfinished(folder)
-    return Results(experiment, episodes, states, load_values(folder / VALUES))
+        raise _unfinished(place)
+    values = decoded_values(place.read(VALUES) or b"", f"{folder}/{VALUES}")
+    return Results(experiment, episodes, states, values)
 
 
-def _unfinished(folder: Path) -> RequestError:
+def _unfinished(folder: Folder) -> RequestError:
     return RequestError(
         f"results folder {folder}: the run is not finished; run it again to continue"
     )
@@ -195,20 +257,35 @@ def _unfinished(folder: Path) -> RequestError:
 def _described(experiment: Experiment) -> str:
     settings = experiment.model_dump(exclude_none=True)
     run = {
+        "format": FORMAT,
         "version": qbumpers.__version__,
         "python": platform.python_version(),
         "platform": platform.platform(),
+        **{name: importlib.metadata.version(name) for name in _LIBRARIES},
     }
     return tomli_w.dumps({**settings, "run": run})
 
 
-def _check_same(folder: Path, experiment: Experiment) -> None:
-    file = folder / EXPERIMENT
-    if not file.is_file():
-        return
-    before = load_experiment(file).model_dump()
-    now = experiment.model_dump()
-    changed = [f for f in now if f not in _GROWING and now[f] != before[f]]
+def _read_design(folder: Folder) -> Experiment | None:
+    """The experiment of an output folder; None where there is none."""
+    content = folder.read(EXPERIMENT)
+    if content is None:
+        return None
+    settings = parsed(content, f"experiment file {folder}/{EXPERIMENT}")
+    found = settings.get("run", {}).get("format", 1)
+    if found != FORMAT:
+        age = "a newer" if isinstance(found, int) and found > FORMAT else "an older"
+        raise RequestError(
+            f"output folder {folder}: written by {age} version of qbumpers (format {found!r}, "
+            f"needed {FORMAT}); choose another folder"
+        )
+    del settings["run"]
+    return make_experiment(settings, f"experiment file {folder}/{EXPERIMENT}", large=True)
+
+
+def _check_same(folder: Folder, found: Experiment, experiment: Experiment) -> None:
+    before, now = found.model_dump(), experiment.model_dump()
+    changed = [f for f in now if f not in _CHANGING and now[f] != before[f]]
     if changed:
         details = "; ".join(f"{f} was {before[f]!r}, now {now[f]!r}" for f in changed)
         raise RequestError(
@@ -216,6 +293,13 @@ def _check_same(folder: Path, experiment: Experiment) -> None:
         )
 
 
+def _renamed(found: Experiment, experiment: Experiment) -> bool:
+    """Whether an id means another condition than it did."""
+    before = {named.condition: named for named in found.conditions()}
+    return any(before.get(named.condition, named) != named for named in experiment.conditions())
+
+
 def run_description(folder: str | Path) -> dict[str, Any]:
-    """The `[run]` table of an output folder: version, python, platform."""
-    return tomllib.loads((Path(folder) / EXPERIMENT).read_text(encoding="utf-8")).get("run", {})
+    """The `[run]` table of an output folder: its format, and the versions and platform that ran."""
+    content = open_folder(folder).read(EXPERIMENT) or b""
+    return parsed(content, f"experiment file {folder}/{EXPERIMENT}").get("run", {})

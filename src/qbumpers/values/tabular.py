@@ -1,6 +1,7 @@
 """Action values of a tabular task, with their provenance, in memory and in a file."""
 
 import hashlib
+import io
 import json
 import math
 import zlib
@@ -89,6 +90,11 @@ class TabularValues:
         Raises:
             StoreError: where it cannot be written.
         """
+        content = self.encoded()
+        write_atomically(Path(path), lambda temporary: temporary.write_bytes(content))
+
+    def encoded(self) -> bytes:
+        """The values as the bytes of a NumPy `.npz` file."""
         provenance = {
             "task": self.task,
             "method": self.method,
@@ -96,12 +102,9 @@ class TabularValues:
             "version": self.version,
             "sha256": self.digest(),
         }
-
-        def write(temporary: Path) -> None:
-            with temporary.open("wb") as file:
-                np.savez_compressed(file, table=self.table, provenance=json.dumps(provenance))
-
-        write_atomically(Path(path), write)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, table=self.table, provenance=json.dumps(provenance))
+        return buffer.getvalue()
 
 
 def load_values(path: str | Path) -> TabularValues:
@@ -117,14 +120,33 @@ def load_values(path: str | Path) -> TabularValues:
         RequestError: where the file is missing, is no such file, or was changed since.
     """
     try:
-        # Opened here: NumPy leaves the file open where it is no archive.
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        content = Path(path).read_bytes()
+    except FileNotFoundError as error:
+        raise RequestError(f"values file {path}: there is none") from error
+    except OSError as error:
+        raise RequestError(f"values file {path}: {error.strerror or error}") from error
+    return decoded_values(content, str(path))
+
+
+def decoded_values(content: bytes, path: str) -> TabularValues:
+    """Values from the bytes of a file that `TabularValues.save` wrote.
+
+    Args:
+        content: of the file.
+        path: for messages.
+
+    Returns:
+        The values.
+
+    Raises:
+        RequestError: where it is no such file, or was changed since.
+    """
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             table = archive["table"]
             provenance = json.loads(str(archive["provenance"]))
         expected = provenance.pop("sha256")
         values = TabularValues(table=table, **provenance)
-    except FileNotFoundError as error:
-        raise RequestError(f"values file {path}: there is none") from error
     except _DAMAGE as error:
         raise RequestError(f"values file {path}: not a file of Q values ({error})") from error
     if values.digest() != expected:

@@ -1,0 +1,117 @@
+"""Recorded steps as a Minari dataset, for offline reinforcement learning and imitation."""
+
+import itertools
+import re
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from qbumpers.errors import RequestError, unknown_name
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.store import load
+from qbumpers.simulation import Steps, record
+from qbumpers.tasks.dynamics import TERMINATED
+
+INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
+         "projected_return")  # fmt: skip
+"""What the `infos` of each step hold beside `trial` and `episode`; see `qbumpers.Step`."""
+
+_VERSIONED = re.compile(r"-v\d+$")
+
+
+def export_recording(
+    folder: str | Path, condition: str, dataset: str, *, trials: int | range = 1
+) -> int:
+    """Play trials of a finished run again and keep every training step as a Minari dataset.
+
+    Observations are numbers of states [N + 1], actions the executed ones [N]. `infos` has the same
+    keys in every episode, `INFOS` with `trial` and `episode`, as arrays [N + 1]: one entry for the
+    reset, where numbers are -1 or NaN, and one a step. Episodes in which the assistant is gone are
+    there too, with probability 0.
+
+    Args:
+        folder: of the run.
+        condition: a readable id in its `episodes.parquet`.
+        dataset: name of the dataset to be made where Minari keeps its own, for instance
+            "cliff/bumpers-v0".
+        trials: how many of the run's trials, or which.
+
+    Returns:
+        How many episodes were written.
+
+    Raises:
+        RequestError: where the folder is not one of a finished run, the condition or a trial is not
+            in it, the dataset is there already or badly named, or Minari is not installed.
+    """
+    try:
+        import minari
+        from minari.data_collector import EpisodeBuffer
+    except ImportError as error:
+        raise RequestError("Minari is not installed: pip install 'qbumpers[minari]'") from error
+    if not _VERSIONED.search(dataset):
+        raise RequestError(
+            f"dataset = {dataset!r}; a name with a version, such as 'cliff/bumpers-v0', is needed"
+        )
+    plan = make_plan(load(folder).experiment)
+    contents = {named.condition: content for named, content in plan.named}
+    if condition not in contents:
+        raise unknown_name("condition", condition, contents)
+    which = range(trials) if isinstance(trials, int) else trials
+    if not which or min(which) < 0 or max(which) >= plan.experiment.trials:
+        raise RequestError(
+            f"trials = {trials!r}; at least 1, of those that were run, 0 to "
+            f"{plan.experiment.trials - 1}, are needed"
+        )
+    chosen = plan.conditions[contents[condition]]
+    buffers = [
+        EpisodeBuffer(id=number, **episode)
+        for number, episode in enumerate(
+            episode
+            for trial in which
+            for episode in _episodes(trial, record(chosen, trial=trial, seed=plan.experiment.seed))
+        )
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # it asks for an author and a link
+        try:
+            minari.create_dataset_from_buffers(
+                dataset,
+                buffers,
+                observation_space=gymnasium.spaces.Discrete(chosen.task.states),
+                action_space=gymnasium.spaces.Discrete(chosen.task.actions),
+                algorithm_name=condition,
+                description=f"Simulated people at {chosen.task.name}, assisted by {condition}.",
+            )
+        except ValueError as error:
+            raise RequestError(f"dataset = {dataset!r}: {error}") from error
+    return len(buffers)
+
+
+def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
+    """The fields of Minari's buffers, an episode each."""
+    ends = [*(np.flatnonzero(np.diff(steps.episode)) + 1), len(steps.episode)]
+    for first, end in itertools.pairwise([0, *ends]):
+        part = Steps(*(array[first:end] for array in steps))
+        terminated = (part.events & TERMINATED) > 0
+        truncated = np.zeros(end - first, bool)
+        truncated[-1] = not terminated[-1]
+        infos = {name: _after_reset(getattr(part, name)) for name in INFOS}
+        numbers = {"trial": trial, "episode": int(part.episode[0])}
+        yield {
+            "observations": np.append(part.state, part.next_state[-1]),
+            "actions": part.executed,
+            "rewards": part.reward,
+            "terminations": terminated,
+            "truncations": truncated,
+            "infos": infos | {k: np.full(end - first + 1, v) for k, v in numbers.items()},
+        }
+
+
+def _after_reset(values: np.ndarray) -> np.ndarray:
+    """An array of steps with an entry for the reset before them."""
+    missing = {"f": np.nan, "i": -1, "b": False}[values.dtype.kind]
+    return np.concatenate([np.full_like(values[:1], missing), values])

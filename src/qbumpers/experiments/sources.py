@@ -1,0 +1,128 @@
+"""Experiments from TOML files, from plain data, and those that are built in."""
+
+import math
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from qbumpers.errors import RequestError, from_validation, unknown_name
+from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
+from qbumpers.experiments.design import (
+    Experiment,
+    LearnerDesign,
+    ScheduleDesign,
+    TaskDesign,
+    reproductions,
+)
+
+
+def make_experiment(
+    settings: dict[str, Any], where: str = "experiment", *, large: bool = False
+) -> Experiment:
+    """An experiment from plain data, checked.
+
+    Args:
+        settings: what a TOML file would hold.
+        where: for messages, for instance the path of the file.
+        large: whether more than `MANY_CELLS` cells of work are meant.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        RequestError: naming each field that is wrong, its value and what is allowed.
+    """
+    try:
+        experiment = Experiment.model_validate(settings)
+    except ValidationError as error:
+        raise from_validation(error, where, _field_names()) from error
+    cells = experiment.condition_count() * math.ceil(
+        experiment.trials / trials_a_cell(experiment.episodes + experiment.retention)
+    )
+    if cells > MANY_CELLS and not large:
+        raise RequestError(
+            f"{where}: {experiment.condition_count():,} conditions, together {cells:,} cells of "
+            f"work; more than {MANY_CELLS:,} must be asked for with --yes"
+        )
+    try:
+        experiment.conditions()
+    except RequestError as error:
+        raise RequestError(f"{where}: {error}") from error
+    return experiment
+
+
+def _field_names() -> list[str]:
+    models = (Experiment, TaskDesign, LearnerDesign, ScheduleDesign)
+    return sorted({field for model in models for field in model.model_fields})
+
+
+def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
+    """An experiment from a TOML file.
+
+    Args:
+        path: of the file.
+        large: whether more than `MANY_CELLS` cells of work are meant.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        RequestError: where the file cannot be read, is no TOML, or a field is wrong.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise RequestError(f"experiment file {path}: {error.strerror or error}") from error
+    settings = parsed(content, f"experiment file {path}")
+    settings.pop("run", None)  # what an output folder adds: version, platform, time
+    return make_experiment(settings, f"experiment file {path}", large=large)
+
+
+def parsed(content: bytes, where: str) -> dict[str, Any]:
+    """What a TOML file says.
+
+    Args:
+        content: of the file.
+        where: for the message, for instance the path of the file.
+
+    Returns:
+        Its tables.
+
+    Raises:
+        RequestError: where it is no TOML.
+    """
+    try:
+        return tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RequestError(f"{where}: not valid TOML: {error}") from error
+
+
+PROFILES = ("figures", "text")
+"""Readings of the paper: what reproduces its numbers, and what its text literally says."""
+
+
+def reproduction(name: str, profile: str = "figures", **changes: Any) -> Experiment:
+    """A published experiment.
+
+    Args:
+        name: for instance "cliff-walking".
+        profile: "figures" or "text", see `PROFILES`.
+        **changes: of fields, for instance `trials=20`; None leaves a field as it is.
+
+    Returns:
+        The experiment.
+
+    Raises:
+        RequestError: where a name is unknown or a change is wrong.
+    """
+    if name not in reproductions():
+        raise unknown_name("reproduction", name, reproductions())
+    if profile not in PROFILES:
+        raise unknown_name("profile", profile, PROFILES)
+    file = resources.files("qbumpers.experiments") / "built_in" / f"{name}.{profile}.toml"
+    settings = tomllib.loads(file.read_text(encoding="utf-8"))
+    settings.update({field: value for field, value in changes.items() if value is not None})
+    return make_experiment(settings, f"{name}, profile {profile}", large=True)

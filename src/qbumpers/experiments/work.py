@@ -1,0 +1,108 @@
+"""The work of one cell: simulated, turned into tables, and encoded as it will be kept."""
+
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+
+from qbumpers.experiments.cells import Cell
+from qbumpers.experiments.store import EPISODES, STATES, encoded
+from qbumpers.simulation import Condition, Simulation
+from qbumpers.simulation import run as run_condition
+from qbumpers.tasks import TabularTask
+from qbumpers.tasks.dynamics import CRASH, SUCCESS
+
+
+class Finished(NamedTuple):
+    """A cell whose work is done.
+
+    Attributes:
+        cell: which one.
+        files: what is to be kept, by kind of table.
+        steps: that its learners took.
+    """
+
+    cell: Cell
+    files: dict[str, bytes]
+    steps: int
+
+
+def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
+    """Do the work of a cell; equal arguments give equal bytes, wherever it is done.
+
+    Args:
+        condition: of the cell.
+        cell: which trials.
+        seed: of the experiment.
+
+    Returns:
+        The cell with its tables, encoded.
+    """
+    simulation = run_condition(condition, trials=range(cell.first, cell.end), seed=seed)
+    tables = {
+        EPISODES: episode_table(condition, cell, simulation),
+        STATES: state_table(condition.task, simulation),
+    }
+    return Finished(cell, {kind: encoded(t) for kind, t in tables.items()}, simulation.steps)
+
+
+def episode_table(condition: Condition, cell: Cell, simulation: Simulation) -> pl.DataFrame:
+    """A row an episode of one cell.
+
+    Args:
+        condition: of the cell.
+        cell: whose trials these are.
+        simulation: what happened.
+
+    Returns:
+        Columns as in `episodes.parquet` from `trial` on; success and crash are null where the task
+        knows none.
+    """
+    outcomes = simulation.outcomes
+    trials, episodes = outcomes.assisted_return.shape
+    number = np.arange(episodes, dtype=np.int32)
+    columns = {
+        "trial": np.repeat(np.arange(cell.first, cell.end, dtype=np.int32), episodes),
+        "episode": np.tile(number, trials),
+        "retention": np.tile(number >= condition.episodes, trials),
+        "assisted_return": outcomes.assisted_return.ravel(),
+        "unassisted_return": outcomes.unassisted_return.ravel(),
+        "assisted_length": outcomes.assisted_length.ravel(),
+        "unassisted_length": outcomes.unassisted_length.ravel(),
+        "overrides": outcomes.overrides.ravel(),
+    }
+    known = {
+        "success": (condition.task.success is not None, SUCCESS),
+        "crash": (condition.task.crash is not None, CRASH),
+    }
+    events = {
+        "assisted": outcomes.assisted_events.ravel(),
+        "unassisted": outcomes.unassisted_events.ravel(),
+    }
+    flags = {
+        f"{who}_{kind}": pl.Series((happened & bit) > 0) if is_known else pl.lit(None, pl.Boolean)
+        for kind, (is_known, bit) in known.items()
+        for who, happened in events.items()
+    }
+    return pl.DataFrame(columns).with_columns(**flags)
+
+
+def state_table(task: TabularTask, simulation: Simulation) -> pl.DataFrame:
+    """A row a state of one cell: how often it was acted in.
+
+    Args:
+        task: the task.
+        simulation: what happened.
+
+    Returns:
+        Columns state, row, column (null where the task is no grid), assisted, overridden and
+        unassisted, in steps of the episodes with an assistant and of the greedy ones after them.
+    """
+    columns = {"state": np.arange(task.states), **simulation.counts._asdict()}
+    table = pl.DataFrame(columns)
+    place = (pl.lit(None, pl.Int64), pl.lit(None, pl.Int64))
+    if task.grid is not None:
+        place = (pl.col("state") // task.grid[1], pl.col("state") % task.grid[1])
+    return table.select(
+        "state", place[0].alias("row"), place[1].alias("column"), pl.exclude("state")
+    )

@@ -1,0 +1,100 @@
+"""Recorded steps as Minari reads them back, against the run's own tables."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+import qbumpers
+from qbumpers.errors import RequestError
+from qbumpers.experiments.recordings import INFOS, export_recording
+from tests.experiments.examples import run_into
+
+minari = pytest.importorskip("minari")
+
+CONDITION = "stochastic-q-bumpers/alpha=0.3"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """The rows of two trials of a run with retention, and the dataset made from them."""
+    folder = run_into(tmp_path_factory.mktemp("recorded") / "out", retention=2)
+    rows = qbumpers.load(folder).episodes.filter(
+        pl.col("condition") == CONDITION, pl.col("trial").is_in([1, 2])
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
+        written = export_recording(folder, CONDITION, "cliff/bumpers-v0", trials=range(1, 3))
+        dataset = minari.load_dataset("cliff/bumpers-v0")
+        with pytest.raises(RequestError, match=r"'cliff/bumpers-v0': .*already exists"):
+            export_recording(folder, CONDITION, "cliff/bumpers-v0")
+        episodes = [dataset[number] for number in range(dataset.total_episodes)]
+        assert written == len(episodes) == rows.height
+        assert dataset.action_space.n == 4
+        assert dataset.observation_space.n == 48
+    return folder, list(zip(rows.iter_rows(named=True), episodes, strict=True))
+
+
+def test_returns_lengths_and_overrides_are_those_of_the_run(recorded):
+    for row, episode in recorded[1]:
+        assert episode.rewards.sum() == row["assisted_return"]
+        assert len(episode.actions) == row["assisted_length"]
+        assert episode.infos["overridden"].sum() == row["overrides"]
+        assert set(episode.infos["trial"]) == {row["trial"]}
+        assert set(episode.infos["episode"]) == {row["episode"]}
+
+
+def test_observations_follow_from_the_executed_actions(recorded):
+    moves = [(-1, 0), (0, 1), (1, 0), (0, -1)]
+    for _, episode in recorded[1]:
+        assert episode.observations[0] == 36
+        for state, action, after in zip(
+            episode.observations, episode.actions, episode.observations[1:], strict=False
+        ):
+            row, column = (np.array(divmod(state, 12)) + moves[action]).clip((0, 0), (3, 11))
+            fell = row == 3 and 0 < column < 11
+            assert after == (36 if fell else 12 * row + column)
+
+
+def test_an_episode_ends_at_the_goal_or_is_cut(recorded):
+    for _, episode in recorded[1]:
+        assert not episode.terminations[:-1].any()
+        assert not episode.truncations[:-1].any()
+        assert episode.terminations[-1] == (episode.observations[-1] == 47)
+        assert episode.truncations[-1] == (not episode.terminations[-1])
+        assert episode.terminations[-1] or len(episode.actions) == 100
+
+
+def test_infos_have_one_structure_with_an_entry_for_the_reset(recorded):
+    values = qbumpers.solve(qbumpers.make_task("cliff-walking"))
+    for row, episode in recorded[1]:
+        infos = episode.infos
+        assert set(infos) == {*INFOS, "trial", "episode"}
+        assert {len(infos[name]) for name in infos} == {len(episode.actions) + 1}
+        assert (infos["proposed"][0], infos["overridden"][0]) == (-1, False)
+        assert np.isnan(infos["probability"][0])
+        assert (infos["values"][1:] == values.table[episode.observations[:-1]]).all()
+        different = infos["proposed"][1:] != episode.actions
+        assert (infos["overridden"][1:] == different).all()
+        if row["retention"]:
+            assert (infos["probability"][1:] == 0).all()
+
+
+WRONG = {
+    "condition": (
+        {"condition": "stochastic-q-bumpers/alpha=0.2"},
+        r"unknown condition .*did you mean 'stochastic-q-bumpers/alpha=0\.3'",
+    ),
+    "trial": ({"trials": range(4, 6)}, r"trials = range\(4, 6\); .* 0 to 4, are needed"),
+    "no trial": ({"trials": 0}, r"trials = 0; at least 1"),
+    "name": ({"dataset": "cliff/bumpers"}, r"'cliff/bumpers'; a name with a version"),
+    "malformed name": ({"dataset": "a b-v0"}, r"dataset = 'a b-v0': Malformed"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), WRONG.values(), ids=list(WRONG))
+def test_what_cannot_be_exported_is_named(recorded, tmp_path, monkeypatch, changes, message):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    arguments = {"condition": CONDITION, "dataset": "other-v0", **changes}
+    with pytest.raises(RequestError, match=message):
+        export_recording(recorded[0], **arguments)
+    assert list(tmp_path.rglob("*.hdf5")) == []
