@@ -3,8 +3,9 @@
 import pytest
 
 from qbumpers.analysis.report import write_report
-from qbumpers.experiments.design import reproduction
-from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.run import run_experiment
+from qbumpers.experiments.sources import reproduction
 
 
 @pytest.fixture(scope="session")

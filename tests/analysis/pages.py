@@ -1,8 +1,9 @@
 """A report as a reader's browser takes it apart."""
 
+import base64
 from html.parser import HTMLParser
 
-VOID = {"meta", "link", "img", "br", "hr", "input"}
+VOID = {"meta", "link", "img", "br", "hr", "input", "wbr"}
 
 
 class Page(HTMLParser):
@@ -11,7 +12,7 @@ class Page(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.open, self.sections, self.nav = [], [], []
-        self.pictures, self.links, self.references = {}, [], []
+        self.pictures, self.links, self.references, self.files = [], [], [], {}
         self.tables, self.words = {}, []
         self.feed(text)
         self.close()
@@ -27,13 +28,21 @@ class Page(HTMLParser):
         if tag == "h2":
             self.sections.append(values["id"])
         elif tag == "img":
-            self.pictures[values["alt"]] = values["src"]
+            self.pictures.append((values["alt"], values["src"]))
         elif tag == "a":
-            (self.nav if "nav" in self.open else self.links).append(values["href"])
-        elif tag == "tr":
+            self._link(values)
+        elif tag == "table":
             self.tables.setdefault(self.sections[-1], []).append([])
+        elif tag == "tr":
+            self.tables[self.sections[-1]][-1].append([])
         elif tag in ("td", "th"):
-            self.tables[self.sections[-1]][-1].append("")
+            self.tables[self.sections[-1]][-1][-1].append("")
+
+    def _link(self, values):
+        if "download" in values:
+            self.files[values["download"]] = content(values["href"])[1]
+        else:
+            (self.nav if "nav" in self.open else self.links).append(values["href"])
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
@@ -41,12 +50,22 @@ class Page(HTMLParser):
     def handle_data(self, data):
         self.words.append(data)
         if {"td", "th"} & set(self.open):
-            self.tables[self.sections[-1]][-1][-1] += data
+            self.tables[self.sections[-1]][-1][-1][-1] += data.replace("\N{NO-BREAK SPACE}", " ")
+
+    def rows(self, section, table=0):
+        """Rows of a section's table, without its head."""
+        return self.tables[section][table][1:]
 
     @property
     def text(self):
         """All words, with single spaces."""
         return " ".join("".join(self.words).split())
+
+
+def content(address):
+    """Type and bytes of an address that holds them."""
+    kind, _, data = address.partition(",")
+    return kind, base64.b64decode(data, validate=True)
 
 
 def number(value, digits=1):

@@ -69,6 +69,8 @@ def test_the_numbers_are_those_that_the_paper_prints():
         (f"{thresholds}0.0191", "unassisted"): -486.9,
         ("maximal", "assisted"): 87.0,
     }
+    ranges = {n["condition"]: n["printed"] for n in numbers["number"] if "printed" in n}
+    assert ranges == {f"{thresholds}0.0195": "51 to 52"}
     regrets = [(r["matched"], r["value"]) for r in numbers["regret"]]
     from_points = 1 - (222.6 - 26.6) / (486.5 - 26.6)
     assert regrets == [
@@ -97,7 +99,7 @@ SUMMARY = pl.DataFrame(
     }
 )
 REDUCTION = Estimate(0.3, 0.25, 0.35)
-REGRET = Regret(0, "x", 50.0, -500.0, Estimate(-300.0, -310.0, -290.0), -20.0, REDUCTION)
+REGRET = Regret(0, "x", "y", 50.0, -500.0, Estimate(-300.0, -310.0, -290.0), -20.0, REDUCTION)
 
 
 def test_conditions_that_were_run_are_compared_and_no_others():
@@ -109,6 +111,18 @@ def test_conditions_that_were_run_are_compared_and_no_others():
     assert found[0].measured.mean == -126.6
     assert math.isnan(found[0].measured.low)
     assert found[1].measured == Estimate(87.0, 87.0, 87.0)
+
+
+def test_a_printed_range_is_told_as_the_paper_prints_it():
+    numbers = [
+        {"condition": "maximal", "measure": "assisted", "value": 86.5, "spread": 0.5, **printed}
+        for printed in ({"printed": "86 to 87"}, {})
+    ]
+    found = compare({"number": numbers, "regret": []}, SUMMARY, {})
+    assert [(row.printed, row.published) for row in found] == [("86 to 87", 86.5), ("86.5", 86.5)]
+    small = [{"matched": "performance", "value": 0.574, "spread": 0.001}]
+    [row] = compare({"number": [], "regret": small}, SUMMARY, {"performance": REGRET})
+    assert row.printed == "0.57"
 
 
 def test_regrets_are_compared_by_what_is_matched():

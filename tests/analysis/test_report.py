@@ -1,44 +1,48 @@
 """The report of the paper's experiment: complete, self-contained, and true to its tables."""
 
-import base64
 import io
 import math
+import platform
 from types import SimpleNamespace
 
+import numpy as np
 import polars as pl
 import pytest
 from PIL import Image
 
+import qbumpers
+from qbumpers.analysis.figures.style import readable
 from qbumpers.analysis.report import find
 from qbumpers.experiments.store import load
-from tests.analysis.pages import Page, interval, number
+from tests.analysis.pages import Page, content, interval, number
 
 FIGURES = [
-    "frontier", "learning-curves", "heatmaps", "q-values", "threshold-maps", "threshold-shares",
+    "frontier", "differences-from-none", "learning-curves", "sensitivity", "override-course",
+    "distribution", "heatmaps", "q-values", "threshold-maps", "threshold-shares",
 ]  # fmt: skip
 SECTIONS = [
-    "frontier", "published", "regret", "curves", "heatmaps", "thresholds", "conditions", "again",
+    "outcome", "frontier", "methods", "published", "control", "curves", "sensitivity",
+    "overrides", "dependence", "distribution", "heatmaps", "thresholds", "conditions", "measures",
+    "again",
 ]  # fmt: skip
+TABLES = ["summary", "published", "regret", "methods", "differences"]
 
 
 @pytest.fixture(scope="module")
 def found(reproduced):
     text = (reproduced / "report.html").read_text(encoding="utf-8")
-    tables = {
-        name: pl.read_csv(reproduced / f"{name}.csv").to_dicts()
-        for name in ("summary", "published", "regret")
-    }
+    tables = {name: pl.read_csv(reproduced / f"{name}.csv").to_dicts() for name in TABLES}
     return SimpleNamespace(folder=reproduced, text=text, page=Page(text), **tables)
 
 
 def test_a_report_comes_with_its_tables_and_figures(reproduced):
     names = {path.name for path in reproduced.iterdir()}
     assert names - {".lock"} == {
-        "cells", "episodes.parquet", "experiment.toml", "figures", "published.csv", "regret.csv",
-        "report.html", "states.parquet", "summary.csv", "values.npz",
+        "cells", "episodes.parquet", "experiment.toml", "figures", "report.html",
+        "states.parquet", "trials.parquet", "values.npz", *(f"{name}.csv" for name in TABLES),
     }  # fmt: skip
     drawn = {path.name for path in (reproduced / "figures").iterdir()}
-    assert drawn == {f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg")}
+    assert drawn == {f"{name}.{ending}" for name in FIGURES for ending in ("png", "svg", "csv")}
 
 
 def test_a_page_needs_nothing_from_elsewhere(found):
@@ -51,13 +55,23 @@ def test_a_page_needs_nothing_from_elsewhere(found):
 
 def test_pictures_are_embedded_and_are_the_figures(found):
     assert len(found.page.pictures) == len(FIGURES)
-    for (caption, source), name in zip(found.page.pictures.items(), FIGURES, strict=True):
+    for (caption, source), name in zip(found.page.pictures, FIGURES, strict=True):
         assert len(caption) > 10
-        kind, _, data = source.partition(",")
+        kind, image = content(source)
         assert kind == "data:image/png;base64"
-        content = base64.b64decode(data, validate=True)
-        assert content == (found.folder / "figures" / f"{name}.png").read_bytes()
-        Image.open(io.BytesIO(content)).verify()
+        assert image == (found.folder / "figures" / f"{name}.png").read_bytes()
+        Image.open(io.BytesIO(image)).verify()
+
+
+def test_the_numbers_behind_every_figure_and_table_are_in_the_page(found):
+    for name in FIGURES:
+        numbers = (found.folder / "figures" / f"{name}.csv").read_bytes()
+        assert found.page.files.pop(f"{name}.csv") == numbers
+        assert pl.read_csv(numbers).height > 1
+    for name in TABLES:
+        assert found.page.files.pop(f"{name}.csv") == (found.folder / f"{name}.csv").read_bytes()
+    settings = (found.folder / "experiment.toml").read_bytes()
+    assert found.page.files == {"experiment.toml": settings}
 
 
 def test_all_sections_are_there_and_the_menu_leads_to_each(found):
@@ -65,22 +79,31 @@ def test_all_sections_are_there_and_the_menu_leads_to_each(found):
     assert found.page.nav == [f"#{section}" for section in SECTIONS]
 
 
-def test_tables_and_figures_are_linked(found):
+def test_pictures_are_linked_as_files_too(found):
     expected = {f"figures/{name}.{ending}" for name in FIGURES for ending in ("png", "svg")}
-    assert set(found.page.links) == expected | {"summary.csv", "episodes.parquet"}
+    assert set(found.page.links) == expected
 
 
 def test_the_table_of_conditions_holds_the_numbers_of_the_summary(found):
-    [_, *rows] = found.page.tables["conditions"]
+    rows = found.page.rows("conditions")
     assert len(rows) == len(found.summary) == 26
     for cells, row in zip(rows, found.summary, strict=True):
-        assert cells == [
+        assert cells[:5] == [
             row["condition"],
             interval(row, "assisted"),
             interval(row, "unassisted"),
             number(row["overrides_mean"], 2),
             f"{100 * row['override_rate_mean']:.0f}%",
         ]
+
+
+def test_a_row_of_trials_is_what_its_episodes_say(found):
+    trials = pl.read_parquet(found.folder / "trials.parquet")
+    assert trials.height == 26 * 5
+    episodes = pl.read_parquet(found.folder / "episodes.parquet")
+    row = trials.row(77, named=True)
+    own = episodes.filter(condition=row["condition"], trial=row["trial"])
+    assert row["assisted"] == pytest.approx(own["assisted_return"].to_numpy().mean())
 
 
 def test_the_summary_is_a_mean_over_trials_of_means_over_episodes(found):
@@ -104,14 +127,14 @@ def test_the_summary_is_a_mean_over_trials_of_means_over_episodes(found):
 
 
 def test_every_printed_number_stands_beside_the_measured_one(found):
-    [_, *rows] = found.page.tables["published"]
+    rows = found.page.rows("published")
     assert len(rows) == len(found.published) == 13
     by_condition = {row["condition"]: row for row in found.summary}
     for cells, row in zip(rows, found.published, strict=True):
         digits = 2 if "regret" in row["what"] else 1
         assert cells[:3] == [
             row["what"],
-            number(row["published"], digits),
+            row["printed"].replace("-", "\N{MINUS SIGN}"),
             interval(row, "measured", digits),
         ]
         assert cells[3] == {True: "yes", False: "no", None: "–"}[row["agrees"]]
@@ -121,12 +144,12 @@ def test_every_printed_number_stands_beside_the_measured_one(found):
 
 
 def test_regret_is_told_with_its_interval(found):
-    [_, *rows] = found.page.tables["regret"]
+    rows = found.page.rows("methods", 1)
     assert [row["matched"] for row in found.regret] == ["performance", "learning"]
     for cells, row in zip(rows, found.regret, strict=True):
         assert [cells[0], *cells[2:]] == [
             row["matched"],
-            row["baseline_condition"],
+            readable(row["baseline_condition"]),
             number(row["level"]),
             number(row["baseline"]),
             interval(row, "method"),
@@ -149,7 +172,7 @@ def test_the_best_possible_is_the_best_of_all_conditions(found):
 
 
 def test_section_4_1_is_told_with_the_papers_numbers(found):
-    [_, *rows] = found.page.tables["thresholds"]
+    rows = found.page.rows("thresholds")
     assert rows == [
         ["(1, 6)", "up", "91", "93", "1.0000"],
         ["(1, 6)", "left", "91", "93", "1.0000"],
@@ -167,6 +190,15 @@ def test_the_settings_of_the_run_are_in_the_page(found):
     assert "26 conditions, 5 trials of 100 episodes each, task cliff-walking" in found.page.text
 
 
+def test_the_page_says_what_to_type_and_which_versions_were_used(found):
+    command = "qbumpers reproduce cliff-walking --profile figures --trials 5 --seed 1"
+    assert command in found.page.text
+    versions = dict(found.page.rows("again"))
+    assert versions["Python"] == platform.python_version()
+    assert versions["numpy"] == np.__version__
+    assert versions["qbumpers"] == qbumpers.__version__
+
+
 def test_intervals_of_regret_are_the_same_whenever_they_are_computed(found):
     again = find(load(found.folder))
     assert again.methods == ("stochastic-q-bumpers", "local-q-thresholding")
@@ -174,3 +206,52 @@ def test_intervals_of_regret_are_the_same_whenever_they_are_computed(found):
         assert again.regrets[row["matched"]].reduction == pytest.approx(
             [row[f"reduction_{part}"] for part in ("mean", "low", "high")]
         )
+
+
+def test_what_came_out_is_told_first_with_the_numbers_of_the_tables(found):
+    again = find(load(found.folder))
+    for sentence in (*again.headlines, *again.cautions):
+        assert sentence in found.page.text
+    best = max(
+        (row for row in found.summary if row["assistant"] == "stochastic-q-bumpers"),
+        key=lambda row: row["unassisted_mean"],
+    )
+    start = f"Stochastic Q Bumpers teaches best at α = {best['alpha']:g}: "
+    assert any(sentence.startswith(start) for sentence in again.headlines)
+    assert any("only 5 trials" in sentence for sentence in again.cautions)
+
+
+def test_methods_are_told_with_what_they_cover(found):
+    rows = found.page.rows("methods")
+    for cells, row in zip(rows, found.methods, strict=True):
+        assert cells[1] == str(row["conditions"])
+        assert cells[2] == interval(row, "assisted_macro")
+        assert cells[4] == f"{100 * row['share']:.0f}%"
+        assert cells[5] == interval(row, "hypervolume", 0)
+    sweeps = [row for row in found.methods if row["assistant"] == "stochastic-q-bumpers"]
+    means = [r["assisted_mean"] for r in found.summary if r["assistant"] == "stochastic-q-bumpers"]
+    assert sweeps[0]["assisted_macro_mean"] == pytest.approx(sum(means) / len(means))
+
+
+def test_every_condition_is_compared_with_no_assistance(found):
+    rows = found.page.rows("control")
+    assert len(rows) == 25
+    none = next(row for row in found.summary if row["condition"] == "none")
+    by_name = {readable(row["condition"]): row for row in found.summary}
+    for cells in rows:
+        for place, measure in ((1, "assisted"), (4, "unassisted")):
+            apart = by_name[cells[0]][f"{measure}_mean"] - none[f"{measure}_mean"]
+            shown = cells[place].partition(" ")[0].replace("\N{MINUS SIGN}", "-").replace(",", "")
+            assert float(shown) == pytest.approx(apart, abs=0.051)
+
+
+def test_pareto_optimal_conditions_are_told_with_their_probability(found):
+    points = [(r["assisted_mean"], r["unassisted_mean"]) for r in found.summary]
+    optimal = {
+        readable(row["condition"])
+        for row, (x, y) in zip(found.summary, points, strict=True)
+        if not any(a >= x and b >= y and (a, b) != (x, y) for a, b in points)
+    }
+    rows = found.page.rows("frontier")
+    assert {cells[0] for cells in rows if "(beaten here)" not in cells[0]} == optimal
+    assert all(cells[3].endswith("%") for cells in rows)

@@ -16,7 +16,10 @@ from tests.experiments.examples import BUMPERS, LAKE, PLAIN, contents_of, run_in
 
 TAXI = {"task": {"name": "Taxi-v4", "discount": 0.9, "episode_limit": 30}}
 NONE = {"assistants": [{"name": "none"}]}
-ANYWHERE = ["frontier", "curves", "conditions", "again"]
+ANYWHERE = [
+    "outcome", "frontier", "methods", "curves", "dependence", "distribution", "conditions",
+    "measures", "again",
+]  # fmt: skip
 
 
 def reported(folder, **changes):
@@ -34,12 +37,13 @@ def plain(tmp_path_factory):
 def test_a_task_on_a_grid_has_maps_but_no_published_numbers_or_thresholds(tmp_path):
     assistants = [{"name": "none"}, {"name": "local-q-thresholding", "alpha": 0.5}]
     page = reported(tmp_path, **{**LAKE, "assistants": assistants})
-    assert page.sections == ["frontier", "curves", "heatmaps", "conditions", "again"]
+    assert set(page.sections) == {*ANYWHERE, "control", "overrides", "heatmaps"}
     assert page.nav == [f"#{section}" for section in page.sections]
     assert not (tmp_path / "published.csv").exists()
     assert not (tmp_path / "regret.csv").exists()
     assert {path.stem for path in (tmp_path / "figures").iterdir()} == {
-        "frontier", "learning-curves", "heatmaps",
+        "frontier", "differences-from-none", "learning-curves", "override-course", "distribution",
+        "heatmaps",
     }  # fmt: skip
 
 
@@ -49,35 +53,35 @@ def test_a_single_episode_of_a_task_without_a_grid_is_reported(tmp_path):
     [row] = pl.read_csv(tmp_path / "summary.csv").to_dicts()
     assert row["assisted_low"] is None
     assert "alpha" not in row
-    [_, cells] = page.tables["conditions"]
+    [cells] = page.rows("conditions")
     assert cells[:3] == ["none", interval(row, "assisted"), interval(row, "unassisted")]
     assert cells[1].endswith("[–, –]")
 
 
 def test_a_single_trial_of_a_sweep_is_reported(tmp_path):
     page = reported(tmp_path, **PLAIN, trials=1)
-    assert len(page.tables["conditions"]) == 1 + 3
-    assert "[–, –]" in page.tables["conditions"][1][1]
+    assert len(page.rows("conditions")) == 3
+    assert "[–, –]" in page.rows("conditions")[0][1]
+    assert "There is one trial a condition: nothing here has an interval." in page.text
 
 
 def test_maximal_assistance_alone_is_reported(tmp_path):
     page = reported(tmp_path, **{**PLAIN, "assistants": [{"name": "maximal"}]})
-    assert [cells[0] for cells in page.tables["conditions"][1:]] == ["maximal"]
+    assert [cells[0] for cells in page.rows("conditions")] == ["maximal"]
 
 
 def test_assistants_that_never_overrode_are_reported(tmp_path):
     quiet = [{"name": "local-q-thresholding", "alpha": 1.0}]
     page = reported(tmp_path, **{**LAKE, "assistants": quiet})
-    assert [cells[0] for cells in page.tables["conditions"][1:]] == ["local-q-thresholding/alpha=1"]
+    assert [cells[0] for cells in page.rows("conditions")] == ["local-q-thresholding/alpha=1"]
 
 
 def test_two_swept_methods_of_ones_own_have_regret_but_no_published_numbers(tmp_path):
     methods = [{"name": "local-q-thresholding", "alpha": [0.01, 0.5]}, BUMPERS]
     page = reported(tmp_path, assistants=methods, episodes=20)
-    assert page.sections == [
-        "frontier", "regret", "curves", "heatmaps", "thresholds", "conditions", "again",
-    ]  # fmt: skip
-    assert len(page.tables["regret"]) == 1 + 2
+    more = {"sensitivity", "overrides", "heatmaps", "thresholds"}
+    assert set(page.sections) == {*ANYWHERE, *more}
+    assert [cells[0] for cells in page.rows("methods", 1)] == ["performance", "learning"]
     assert "The thresholding cluster is one assistant" not in page.text  # it takes second-best
 
 
@@ -97,7 +101,7 @@ def test_a_report_needs_its_own_files_alone_and_comes_out_the_same(plain, tmp_pa
     parts = []
     findings = write_report(folder, advance=parts.append)
     expected = contents_of(plain, "*.csv", "*.html", "figures/*")
-    assert len(expected) == 2 + 2 * 2
+    assert len(expected) == 4 + 3 * 6
     assert contents_of(folder, "*.csv", "*.html", "figures/*") == expected
     assert parts[0] == "tables"
     assert parts[-1] == "report.html"
@@ -117,3 +121,68 @@ def test_a_full_disk_leaves_the_old_report_whole(plain, tmp_path, monkeypatch):
     with pytest.raises(StoreError, match=r"cannot write .*summary\.csv: No space left on device"):
         write_report(folder)
     assert contents_of(folder, "*.*", ".*", "figures/*", "figures/.*") == before
+
+
+SEVERAL = {
+    "learners": [{"perception": ["transition", "observant"]}],
+    "retention": 2,
+    "criterion": -20.0,
+    "common_random_numbers": True,
+}
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("several")
+    return folder, reported(folder, **PLAIN, **SEVERAL)
+
+
+def test_learners_are_told_apart_and_compared(several):
+    folder, page = several
+    assert "learners" in page.sections
+    summary = {row["condition"]: row for row in pl.read_csv(folder / "summary.csv").to_dicts()}
+    assert len(page.tables["conditions"]) == 2
+    for table, learner in enumerate(("transition", "observant")):
+        found = [cells[0] for cells in page.rows("conditions", table)]
+        assert found == [name for name in summary if name.endswith(f"@perception={learner}")]
+    for table, measure in enumerate(("unassisted", "assisted")):
+        [none, *_] = page.rows("learners", table)
+        expected = [
+            interval(summary[f"none@perception={learner}"], measure)
+            for learner in ("transition", "observant")
+        ]
+        assert none == ["No assistance", *expected]
+    names = {path.stem for path in (folder / "figures").iterdir()}
+    assert {name.partition("@")[2] for name in names} == {
+        "perception=transition", "perception=observant",
+    }  # fmt: skip
+    differences = pl.read_csv(folder / "differences.csv")
+    assert differences.group_by("learner").len()["len"].to_list() == [4, 4]
+
+
+def test_retention_and_the_criterion_are_told(several):
+    folder, page = several
+    assert "and 2 more without the assistant" in page.text
+    assert "The criterion is a return of \N{MINUS SIGN}20.0" in page.text
+    head, none, *_ = page.tables["dependence"][0]
+    [row] = (
+        pl.read_csv(folder / "summary.csv")
+        .filter(condition="none@perception=transition")
+        .to_dicts()
+    )
+    assert none[head.index("retention")] == interval(row, "retention")
+    episodes = pl.read_parquet(folder / "episodes.parquet")
+    late = episodes.filter("retention", condition="none@perception=transition")
+    assert row["retention_mean"] == pytest.approx(late["unassisted_return"].to_numpy().mean())
+
+
+def test_what_an_earlier_analysis_left_is_removed_and_nothing_else(plain, tmp_path):
+    folder = tmp_path / "again"
+    shutil.copytree(plain, folder)
+    stale = ["regret.csv", "published.csv", "figures/old.png", "figures/old.svg", "figures/old.csv"]
+    own = ["notes.csv", "figures/notes.txt"]
+    for name in (*stale, *own):
+        (folder / name).write_text("x", encoding="utf-8")
+    before = set(contents_of(folder, "**/*"))
+    write_report(folder)
+    assert set(contents_of(folder, "**/*")) == before - set(stale)

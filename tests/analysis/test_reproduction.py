@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from qbumpers.analysis.measures import trial_means, trial_samples
+from qbumpers.analysis.measures import trial_measures, trial_samples
 from qbumpers.analysis.report import find
 from qbumpers.analysis.statistics import standard_error
-from qbumpers.experiments.design import reproduction
-from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.run import run_experiment
+from qbumpers.experiments.sources import reproduction
 from qbumpers.experiments.store import load
 
 TRIALS = 300
@@ -43,7 +44,7 @@ def text(tmp_path_factory):
 
 def assert_close(found, reference):
     """Each measured mean lies within four combined standard errors of its reference."""
-    samples = trial_samples(trial_means(found.episodes), "assisted", "unassisted")
+    samples = trial_samples(trial_measures(found.episodes), "assisted", "unassisted")
     for condition, numbers in reference.items():
         for measured, (mean, error) in zip(samples[condition].T, numbers, strict=True):
             combined = np.hypot(standard_error(measured), error)
@@ -77,7 +78,7 @@ def test_the_text_reading_gives_the_reference_means(text):
 
 @pytest.mark.slow
 def test_without_help_the_text_reading_learns_far_less(text):
-    samples = trial_samples(trial_means(text.episodes), "unassisted")["none"][:, 0]
+    samples = trial_samples(trial_measures(text.episodes), "unassisted")["none"][:, 0]
     # The reference, about -107, states no error: four of the measured ones, and 3 for rounding.
     assert abs(samples.mean() + 107) <= 4 * standard_error(samples) + 3
 

@@ -1,13 +1,12 @@
 """Performance against learning: Pareto frontiers, and regret at matched performance or learning."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from qbumpers.analysis.statistics import Estimate, bootstrap_means, percentile_interval
-
-RESAMPLES = 2000
+from qbumpers.analysis.resampling import function_interval, resampled_means
+from qbumpers.analysis.statistics import RESAMPLES, Estimate
 
 
 def pareto(points: np.ndarray) -> np.ndarray:
@@ -25,7 +24,45 @@ def pareto(points: np.ndarray) -> np.ndarray:
     return order[second > best_before][::-1]
 
 
-def at_matched(points: np.ndarray, level: float, axis: int) -> float:
+def is_optimal(points: np.ndarray) -> np.ndarray:
+    """Which points no other point beats: none is as good in both measures and better in one.
+
+    Args:
+        points: float64 [..., N, 2], assisted and unassisted; larger is better.
+
+    Returns:
+        bool [..., N]; of equal points, all or none.
+    """
+    first, second = points[..., 0], points[..., 1]
+    beaten = np.zeros(first.shape, np.bool_)
+    for index in range(first.shape[-1]):
+        x, y = first[..., index, np.newaxis], second[..., index, np.newaxis]
+        beaten |= (x >= first) & (y >= second) & ((x > first) | (y > second))
+    return ~beaten
+
+
+def optimal_probability(
+    samples: Mapping[str, np.ndarray],
+    generator: np.random.Generator,
+    paired: bool = False,
+    resamples: int = RESAMPLES,
+) -> dict[str, float]:
+    """How often each condition is Pareto-optimal among resamples of the trials.
+
+    Args:
+        samples: float64 [T, 2], assisted and unassisted by trial, of each condition.
+        generator: draws the resamples.
+        paired: draw the same trials in all conditions (common random numbers).
+        resamples: how many.
+
+    Returns:
+        The share of the resamples, by condition.
+    """
+    points = resampled_means(list(samples.values()), generator, paired, resamples)
+    return dict(zip(samples, is_optimal(points).mean(axis=0).tolist(), strict=True))
+
+
+def at_matched(points: np.ndarray, level: np.ndarray | float, axis: int) -> np.ndarray:
     """What a method reaches in one measure at a given level of the other.
 
     Interpolates linearly between neighbours on the frontier. Below the frontier's range the
@@ -33,19 +70,31 @@ def at_matched(points: np.ndarray, level: float, axis: int) -> float:
     setting of the method reaches the level.
 
     Args:
-        points: float64 [N, 2], assisted and unassisted means of the settings of one method.
-        level: of measure `axis`.
+        points: float64 [..., N, 2], assisted and unassisted means of the settings of one method.
+        level: float64 [...], of measure `axis`.
         axis: 0 matches assisted performance, 1 matches unassisted learning.
 
     Returns:
-        The other measure; NaN where the level is out of reach.
+        float64 [...], the other measure; NaN where the level is out of reach.
     """
-    frontier = points[pareto(points)]
-    frontier = frontier[np.argsort(frontier[:, axis])]
-    matched, asked = frontier[:, axis], frontier[:, 1 - axis]
-    if level > matched[-1]:
-        return float("nan")
-    return float(np.interp(level, matched, asked))
+    matched, asked = points[..., axis], points[..., 1 - axis]
+    levels = np.asarray(level, np.float64)[..., np.newaxis]
+    enough = matched >= levels
+    possible = np.any(enough, axis=-1, keepdims=True)
+    above = np.where(possible, _best(matched, asked, enough), np.nan)
+    short = ~enough & (asked > above[..., 1, np.newaxis])
+    between = np.any(short, axis=-1, keepdims=True)
+    start = np.where(between, _best(asked, matched, short)[..., ::-1], above)
+    way = above - start
+    share = (levels - start)[..., 0] / np.where(between, way, 1.0)[..., 0]
+    return start[..., 1] + np.where(between[..., 0], share, 1.0) * way[..., 1]
+
+
+def _best(other: np.ndarray, value: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """(other, value) [..., 2] of the largest value among some; of equal ones, the largest other."""
+    top = np.where(among, value, -np.inf).max(axis=-1)
+    equal = among & (value == top[..., np.newaxis])
+    return np.stack([np.where(equal, other, -np.inf).max(axis=-1), top], axis=-1)
 
 
 class Regret(NamedTuple):
@@ -54,7 +103,8 @@ class Regret(NamedTuple):
     Attributes:
         axis: 0 where assisted performance is matched and learning compared, 1 the reverse.
         baseline_condition: the baseline's setting that is matched.
-        level: the matched measure, at that setting.
+        best_condition: the condition that is best in the compared measure.
+        level: the matched measure, at the baseline's setting.
         baseline: the other measure, at that setting.
         method: what the method reaches there.
         best: the best possible, from which regret is counted.
@@ -63,6 +113,7 @@ class Regret(NamedTuple):
 
     axis: int
     baseline_condition: str
+    best_condition: str
     level: float
     baseline: float
     method: Estimate
@@ -71,60 +122,61 @@ class Regret(NamedTuple):
 
 
 def matched_regret(
-    method: Mapping[str, np.ndarray],
-    baseline: Mapping[str, np.ndarray],
-    best: np.ndarray,
+    samples: Mapping[str, np.ndarray],
+    method: Sequence[str],
+    baseline: Sequence[str],
     axis: int,
     generator: np.random.Generator,
+    paired: bool = False,
     resamples: int = RESAMPLES,
 ) -> Regret:
     """Regret of a method relative to a baseline at matched performance or matched learning.
 
-    The baseline stands at its best setting in the compared measure. The interval is a percentile
-    bootstrap over trials, with the frontier found anew in each resample.
+    The baseline stands at its best setting in the compared measure; regret is counted from the
+    best condition of all. Both, and the method's frontier, are found anew in each resample of the
+    trials, so that the intervals know that they were picked.
 
     Args:
-        method: samples float64 [T, 2], assisted and unassisted by trial, of each setting.
-        baseline: the same of the baseline's settings.
-        best: samples float64 [T, 2] of the condition that is best in the compared measure.
+        samples: float64 [T, 2], assisted and unassisted by trial, of all conditions.
+        method: ids of its settings.
+        baseline: ids of its settings.
         axis: 0 matches assisted performance, 1 matches unassisted learning.
         generator: draws the resamples.
-        resamples: number of bootstrap resamples.
+        paired: draw the same trials in all conditions (common random numbers).
+        resamples: how many.
 
     Returns:
         The regret.
     """
-    names = list(baseline)
-    means = np.array([samples.mean(axis=0) for samples in baseline.values()])
-    chosen = int(np.argmax(means[:, 1 - axis]))
+    names = list(samples)
+    ours, theirs = ([names.index(name) for name in chosen] for chosen in (method, baseline))
+    means = np.array([values.mean(axis=0) for values in samples.values()])
+    resampled = resampled_means(list(samples.values()), generator, paired, resamples)
 
-    def evaluate(points: np.ndarray, reference: np.ndarray, top: np.ndarray) -> tuple[float, float]:
-        reached = at_matched(points, reference[axis], axis)
-        gap = top[1 - axis] - reference[1 - axis]
-        return reached, float(1 - (top[1 - axis] - reached) / gap) if gap > 0 else float("nan")
+    def reached(points: np.ndarray) -> np.ndarray:
+        return at_matched(points[..., ours, :], _standing(points, theirs, axis)[..., axis], axis)
 
-    points = np.array([samples.mean(axis=0) for samples in method.values()])
-    reached, reduction = evaluate(points, means[chosen], best.mean(axis=0))
-    replicates = _replicates(
-        [*method.values(), baseline[names[chosen]], best], evaluate, generator, resamples
-    )
+    def reduction(points: np.ndarray) -> np.ndarray:
+        best = points[..., 1 - axis].max(axis=-1)
+        gap = best - _standing(points, theirs, axis)[..., 1 - axis]
+        return 1 - (best - reached(points)) / np.where(gap > 0, gap, np.nan)
+
+    chosen = theirs[int(np.argmax(means[theirs, 1 - axis]))]
+    best = int(np.argmax(means[:, 1 - axis]))
     return Regret(
         axis=axis,
         baseline_condition=names[chosen],
+        best_condition=names[best],
         level=float(means[chosen, axis]),
         baseline=float(means[chosen, 1 - axis]),
-        method=percentile_interval(reached, replicates[:, 0]),
-        best=float(best.mean(axis=0)[1 - axis]),
-        reduction=percentile_interval(reduction, replicates[:, 1]),
+        method=function_interval(reached, means, resampled),
+        best=float(means[best, 1 - axis]),
+        reduction=function_interval(reduction, means, resampled),
     )
 
 
-def _replicates(
-    samples: Sequence[np.ndarray],
-    evaluate: Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[float, float]],
-    generator: np.random.Generator,
-    resamples: int,
-) -> np.ndarray:
-    """Evaluations [B, 2] of resampled means; the last two samples are the baseline and the best."""
-    means = np.stack([bootstrap_means(s, resamples, generator) for s in samples], axis=1)
-    return np.array([evaluate(row[:-2], row[-2], row[-1]) for row in means])
+def _standing(points: np.ndarray, settings: Sequence[int], axis: int) -> np.ndarray:
+    """The setting [..., 2] that is best in the measure that is not matched."""
+    among = points[..., settings, :]
+    best = np.argmax(among[..., 1 - axis], axis=-1)[..., np.newaxis, np.newaxis]
+    return np.take_along_axis(among, best, axis=-2)[..., 0, :]

@@ -1,6 +1,6 @@
 """What is measured: a row a trial, a row a condition, and curves over episodes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -8,35 +8,130 @@ import polars as pl
 
 from qbumpers.analysis.statistics import mean_interval
 
-ESTIMATED = (
-    "assisted",
-    "unassisted",
-    "overrides",
-    "override_rate",
-    "assisted_success",
-    "unassisted_success",
-    "assisted_crash",
-    "unassisted_crash",
-)
-"""Measures of a trial: each is a mean over its episodes."""
+MEASURES = {
+    "assisted": "return with the assistant, mean over the training episodes, reward units",
+    "unassisted": "return of the greedy episodes without it, mean over the training, reward units",
+    "assisted_last": "assisted return over the last 10% of the training, reward units",
+    "unassisted_last": "unassisted return over the last 10% of the training, reward units",
+    "assisted_area": "area under the curve of assisted returns, reward units x episodes",
+    "unassisted_area": "area under the curve of unassisted returns, reward units x episodes",
+    "overrides": "overrides an episode",
+    "override_rate": "overrides a step, over the whole training",
+    "override_rate_first": "overrides a step, over the first 10% of the training",
+    "override_rate_last": "overrides a step, over the last 10% of the training",
+    "dependence": "assisted minus unassisted return, reward units",
+    "dependence_last": "assisted minus unassisted return, last 10% of the training, reward units",
+    "retention": "unassisted return over further episodes without the assistant, reward units",
+    "assisted_success": "share of the assisted episodes that succeed",
+    "unassisted_success": "share of the unassisted episodes that succeed",
+    "assisted_crash": "share of the assisted episodes that crash",
+    "unassisted_crash": "share of the unassisted episodes that crash",
+    "criterion_episodes": "training episodes until the criterion; all of them where never reached",
+    "criterion_reached": "share of the trials that reach the criterion",
+}
+"""Measures of a trial, in the order of tables: what each is, and its unit."""
+
+CRITERION_RUN = 5
+"""Successive unassisted episodes that must reach the criterion."""
+
+_KEY = ("condition", "trial")
+_EVENTS = ("assisted_success", "unassisted_success", "assisted_crash", "unassisted_crash")
 
 
-def trial_means(episodes: pl.DataFrame) -> pl.DataFrame:
-    """A row a trial: means over its episodes (macro averages start here).
+def trial_measures(episodes: pl.DataFrame, criterion: float | None = None) -> pl.DataFrame:
+    """A row a trial: its measures (macro averages start here).
+
+    The first and last 10% are rounded down to whole episodes, at least one. Areas are by
+    trapezoids. A trial reaches the criterion with the first of five successive unassisted
+    episodes that do (of all of them, where a trial has fewer); `criterion_episodes` counts the
+    training episodes up to there. A trial that never does counts with all its episodes, so that
+    their mean is a restricted one: at most the mean that longer trials would have.
 
     Args:
         episodes: as in `episodes.parquet`.
+        criterion: the unassisted return that counts as having learned.
 
     Returns:
-        Columns condition, trial, and one for each of `ESTIMATED`; returns are in reward units,
-        overrides per episode, `override_rate` per step, the rest are shares of episodes.
+        Columns condition, assistant, alpha, learner, trial, and one for each of `MEASURES`; null
+        where unknown. Conditions in the order of the episodes, trials by number.
     """
-    return episodes.group_by("condition", "trial", maintain_order=True).agg(
-        pl.col("assisted_return").mean().alias("assisted"),
-        pl.col("unassisted_return").mean().alias("unassisted"),
+    training = episodes.filter(~pl.col("retention"))
+    measured = _training_measures(training)
+    for found in (_retention(episodes.filter("retention")), _criterion(training, criterion)):
+        measured = measured.join(found, on=_KEY, how="left", maintain_order="left")
+    return measured.select("condition", "assistant", "alpha", "learner", "trial", *MEASURES)
+
+
+def _training_measures(training: pl.DataFrame) -> pl.DataFrame:
+    """Everything that training episodes say, by trial."""
+    order = training["condition"].unique(maintain_order=True)
+    length = int(training["episode"].max()) + 1 if training.height else 0  # type: ignore[arg-type]
+    found = training.group_by(*_KEY, maintain_order=True).agg(
+        pl.col("assistant", "alpha", "learner").first(),
+        *(expression for side in ("assisted", "unassisted") for expression in _of(side, length)),
         pl.col("overrides").mean(),
-        (pl.col("overrides").sum() / pl.col("assisted_length").sum()).alias("override_rate"),
-        *(pl.col(name).mean() for name in ESTIMATED[4:]),
+        *_override_rates(length),
+        *(pl.col(event).mean() for event in _EVENTS),
+    )
+    return (
+        found.with_columns(
+            dependence=pl.col("assisted") - pl.col("unassisted"),
+            dependence_last=pl.col("assisted_last") - pl.col("unassisted_last"),
+            place=pl.col("condition").replace_strict(order, range(len(order))),
+        )
+        .sort("place", "trial")
+        .drop("place")
+    )
+
+
+def _of(side: str, length: int) -> list[pl.Expr]:
+    """Mean, mean over the last tenth and area of the returns of "assisted" or "unassisted"."""
+    returns, episode = pl.col(f"{side}_return"), pl.col("episode")
+    ends = returns.filter(episode == 0).sum() + returns.filter(episode == length - 1).sum()
+    return [
+        returns.mean().alias(side),
+        returns.filter(episode >= length - _tenth(length)).mean().alias(f"{side}_last"),
+        (returns.sum() - ends / 2).alias(f"{side}_area"),
+    ]
+
+
+def _override_rates(length: int) -> Iterator[pl.Expr]:
+    episode = pl.col("episode")
+    spans = {
+        "override_rate": pl.lit(True),
+        "override_rate_first": episode < _tenth(length),
+        "override_rate_last": episode >= length - _tenth(length),
+    }
+    for name, span in spans.items():
+        overrides, steps = (pl.col(c).filter(span).sum() for c in ("overrides", "assisted_length"))
+        yield (overrides / steps).alias(name)
+
+
+def _tenth(length: int) -> int:
+    return max(1, length // 10)
+
+
+def _retention(retained: pl.DataFrame) -> pl.DataFrame:
+    return retained.group_by(*_KEY).agg(pl.col("unassisted_return").mean().alias("retention"))
+
+
+def _criterion(training: pl.DataFrame, criterion: float | None) -> pl.DataFrame:
+    """When each trial reaches the criterion, if there is one."""
+    if criterion is None:
+        unknown = pl.lit(None, pl.Float64)
+        return training.select(*_KEY).unique().with_columns(
+            criterion_episodes=unknown, criterion_reached=unknown
+        )  # fmt: skip
+    run = min(CRITERION_RUN, training["episode"].n_unique())
+    reached = pl.col("unassisted_return").sort_by("episode") >= criterion
+    complete = reached.cast(pl.Int32).rolling_sum(run) == run
+    return training.group_by(*_KEY).agg(
+        pl.when(complete.any())
+        .then(complete.arg_max() - (run - 2))
+        .otherwise(pl.len())
+        .cast(pl.Float64)
+        .alias("criterion_episodes"),
+        complete.any().cast(pl.Float64).alias("criterion_reached"),
     )
 
 
@@ -44,14 +139,18 @@ def trial_samples(trials: pl.DataFrame, *measures: str) -> dict[str, np.ndarray]
     """Samples of each condition.
 
     Args:
-        trials: from `trial_means`.
+        trials: from `trial_measures`.
         *measures: M columns.
 
     Returns:
-        float64 [T, M] by condition, in the order of the experiment.
+        float64 [T, M] by condition, in the order of the experiment, trials by number; NaN where a
+        measure is unknown.
     """
     parts = trials.partition_by("condition", as_dict=True, maintain_order=True)
-    return {str(key[0]): part.select(measures).to_numpy() for key, part in parts.items()}
+    return {
+        str(key[0]): part.sort("trial").select(pl.col(measures).cast(pl.Float64)).to_numpy()
+        for key, part in parts.items()
+    }
 
 
 def summary(
@@ -61,29 +160,45 @@ def summary(
 
     Args:
         episodes: as in `episodes.parquet`.
-        trials: from `trial_means`.
-        options: of the assistant of each condition, by its id.
+        trials: from `trial_measures`.
+        options: of each condition, by its id.
 
     Returns:
-        The table of `summary.csv`.
+        The table of `summary.csv`: what a condition is, how much of it was run, and
+        `<measure>_mean`, `_low` and `_high` of every measure that is known.
     """
-    assistants = dict(episodes.select("condition", "assistant").unique().iter_rows())
-    counts = dict(trials.group_by("condition").len().iter_rows())
-    length = episodes["episode"].n_unique()
+    known = [name for name in MEASURES if trials[name].null_count() < trials.height]
+    counts = _counts(episodes)
     names = list(dict.fromkeys(name for chosen in options.values() for name in chosen))
     leading = [name for name in ("alpha", "second") if name in names]
     rows = []
-    for condition, samples in trial_samples(trials, *ESTIMATED).items():
-        chosen = options.get(condition, {})
-        row: dict[str, Any] = {"condition": condition, "assistant": assistants[condition]}
+    for part in trials.partition_by("condition", maintain_order=True):
+        first = part.row(0, named=True)
+        chosen = options.get(first["condition"], {})
+        row: dict[str, Any] = {name: first[name] for name in ("condition", "assistant", "learner")}
         row |= {name: chosen.get(name) for name in (*leading, *sorted(set(names) - set(leading)))}
-        row |= {"trials": counts[condition], "episodes": length}
-        for measure, values in zip(ESTIMATED, samples.T.astype(np.float64), strict=True):
-            estimate = mean_interval(values)
-            for part, number in estimate._asdict().items():
-                row[f"{measure}_{part}"] = None if np.isnan(number) else number
+        row |= {"trials": part.height, **counts}
+        for measure in known:
+            values = part[measure].cast(pl.Float64).drop_nulls().to_numpy()
+            row |= _columns(measure, values)
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def _counts(episodes: pl.DataFrame) -> dict[str, int]:
+    """Episodes a trial; those of retention only where there are any."""
+    lengths = dict(episodes.group_by("retention").agg(pl.col("episode").n_unique()).iter_rows())
+    retained = {"retention_episodes": lengths[True]} if True in lengths else {}
+    return {"episodes": lengths.get(False, 0), **retained}
+
+
+def _columns(measure: str, values: np.ndarray) -> dict[str, float | None]:
+    """The three columns of a measure; null where unknown."""
+    numbers = mean_interval(values)._asdict() if len(values) else {}
+    return {
+        f"{measure}_{part}": None if np.isnan(numbers.get(part, np.nan)) else numbers[part]
+        for part in ("mean", "low", "high")
+    }
 
 
 def learning_curve(episodes: pl.DataFrame, condition: str, column: str) -> np.ndarray:
@@ -101,3 +216,18 @@ def learning_curve(episodes: pl.DataFrame, condition: str, column: str) -> np.nd
     length = chosen["episode"].n_unique()
     table = chosen[column].cast(pl.Float64).to_numpy().reshape(-1, length)
     return np.array([mean_interval(values) for values in table.T]).T
+
+
+def override_curve(episodes: pl.DataFrame, condition: str) -> np.ndarray:
+    """Mean and 95% interval of the override rate in each training episode, over trials.
+
+    Args:
+        episodes: as in `episodes.parquet`.
+        condition: which one.
+
+    Returns:
+        float64 [3, E]: mean, low, high; overrides a step.
+    """
+    rate = pl.col("overrides") / pl.col("assisted_length")
+    training = episodes.filter(~pl.col("retention")).with_columns(override_rate=rate)
+    return learning_curve(training, condition, "override_rate")

@@ -10,6 +10,7 @@ import polars as pl
 from scipy.special import ndtri
 
 from qbumpers.analysis.frontier import Regret
+from qbumpers.analysis.numerals import written
 from qbumpers.analysis.statistics import CONFIDENCE, Estimate
 
 AGREEMENT = 0.99
@@ -21,7 +22,8 @@ class Comparison(NamedTuple):
 
     Attributes:
         what: which number.
-        published: as printed.
+        published: the printed number; the middle where a range is printed.
+        printed: the number as the paper prints it, for instance "51 to 52".
         measured: with its 95% interval.
         agrees: whether they differ by no more than sampling explains; None where unmeasured.
         note: on the printed number.
@@ -29,6 +31,7 @@ class Comparison(NamedTuple):
 
     what: str
     published: float
+    printed: str
     measured: Estimate
     agrees: bool | None
     note: str
@@ -66,7 +69,8 @@ def published_numbers(name: str) -> dict[str, Any]:
         name: for instance "cliff-walking".
 
     Returns:
-        Lists `number` (condition, measure, value, spread) and `regret` (matched, value, spread).
+        Lists `number` (condition, measure, value, spread) and `regret` (matched, value, spread);
+        `printed` where the paper prints no single number.
     """
     file = resources.files("qbumpers.analysis") / "published" / f"{name}.toml"
     if not file.is_file():
@@ -101,10 +105,14 @@ def compare(
         if number["matched"] in regrets:
             other = {"performance": "learning", "learning": "performance"}[number["matched"]]
             what = f"less regret in {other}, matched {number['matched']}"
-            compared.append(_comparison(what, number, regrets[number["matched"]].reduction))
+            compared.append(_comparison(what, number, regrets[number["matched"]].reduction, 2))
     return compared
 
 
-def _comparison(what: str, number: Mapping[str, Any], measured: Estimate) -> Comparison:
-    verdict = agrees(number["value"], number["spread"], measured)
-    return Comparison(what, number["value"], measured, verdict, number.get("note", ""))
+def _comparison(
+    what: str, number: Mapping[str, Any], measured: Estimate, digits: int = 1
+) -> Comparison:
+    value = number["value"]
+    printed = number.get("printed", written(value, digits))
+    verdict = agrees(value, number["spread"], measured)
+    return Comparison(what, value, printed, measured, verdict, number.get("note", ""))

@@ -1,18 +1,42 @@
 """Learning curves."""
 
 import numpy as np
+import polars as pl
 import pytest
 
-from qbumpers.analysis.figures.curves import curves_figure, representative
-from qbumpers.analysis.measures import learning_curve
+from qbumpers.analysis.figures.curves import (
+    courses_figure,
+    curves_figure,
+    learning_curves,
+    override_courses,
+    representative,
+)
+from qbumpers.analysis.figures.style import looks
+from qbumpers.analysis.measures import learning_curve, override_curve
 from tests.analysis.examples import BUMPERS, THRESHOLDS, episode_table, summary_table
 
 CHOSEN = ["none", *list(BUMPERS)[:2]]
+DRAWN = looks(["none", "stochastic-q-bumpers"])
+
+
+def episodes_of(conditions=CHOSEN, retained=0, **shape):
+    """Made-up episodes, the last of which may be without the assistant."""
+    table = episode_table(conditions, **shape)
+    last = pl.col("episode").max()
+    return table.with_columns(
+        retention=pl.col("episode") > last - retained,
+        overrides=pl.col("episode") % 3 + pl.col("trial"),
+        assisted_length=10 + pl.col("trial"),
+    )
+
+
+def drawn_from(table, conditions=CHOSEN):
+    return curves_figure(learning_curves(table, conditions), DRAWN)
 
 
 def test_every_condition_is_a_line_with_a_band_in_both_panels():
-    table = episode_table(CHOSEN)
-    drawing = curves_figure(table, CHOSEN)
+    table = episodes_of()
+    drawing = drawn_from(table)
     assert [axes.get_title(loc="left") for axes in drawing.axes] == [
         "With the assistant",
         "Without it",
@@ -26,7 +50,7 @@ def test_every_condition_is_a_line_with_a_band_in_both_panels():
 
 
 def test_the_legend_names_the_conditions_and_lines_of_one_assistant_differ():
-    drawing = curves_figure(episode_table(CHOSEN), CHOSEN)
+    drawing = drawn_from(episodes_of())
     [legend] = drawing.legends
     assert [text.get_text() for text in legend.get_texts()] == [
         "No assistance",
@@ -35,14 +59,54 @@ def test_the_legend_names_the_conditions_and_lines_of_one_assistant_differ():
     ]
     lines = drawing.axes[0].lines
     assert lines[1].get_color() == lines[2].get_color() != lines[0].get_color()
+    assert lines[1].get_marker() == lines[2].get_marker() != lines[0].get_marker()
     assert lines[1].get_linestyle() != lines[2].get_linestyle()
+
+
+def test_the_numbers_behind_the_curves_are_means_and_intervals_by_episode():
+    table = episodes_of(retained=2)
+    numbers = learning_curves(table, CHOSEN)
+    assert numbers["condition"].unique(maintain_order=True).to_list() == CHOSEN
+    for condition in CHOSEN:
+        rows = numbers.filter(condition=condition)
+        assert rows["episode"].to_list() == [1, 2, 3, 4, 5, 6]
+        assert rows["retention"].to_list() == [False] * 4 + [True] * 2
+        for column in ("assisted_return", "unassisted_return"):
+            parts = rows.select(f"{column}_{part}" for part in ("mean", "low", "high")).to_numpy()
+            assert np.allclose(parts.T, learning_curve(table, condition, column))
+
+
+def test_episodes_without_the_assistant_stand_on_grey():
+    def greys(axes):
+        return [
+            patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches
+        ]
+
+    for axes in drawn_from(episodes_of(retained=2)).axes:
+        [span] = greys(axes)
+        assert (span.x0, span.x1) == pytest.approx((4.5, 6.5))
+    assert not any(axes.patches for axes in drawn_from(episodes_of()).axes)
+
+
+def test_the_course_of_overrides_is_in_per_cent_of_steps():
+    table = episodes_of(CHOSEN[1:])
+    courses = override_courses(table, CHOSEN[1:])
+    [axes] = courses_figure(courses, DRAWN).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("episode", "steps overridden, per cent")
+    assert axes.get_ylim()[0] <= 0
+    for line, condition in zip(axes.lines, CHOSEN[1:], strict=True):
+        mean, low, high = override_curve(table, condition)
+        rows = courses.filter(condition=condition)
+        assert rows["override_rate_low"].to_numpy() == pytest.approx(low)
+        assert rows["override_rate_high"].to_numpy() == pytest.approx(high)
+        assert line.get_ydata() == pytest.approx(100 * mean)
 
 
 @pytest.mark.parametrize(
     ("deepest", "scale"), [(-100.0, "linear"), (-5000.0, "symlog")], ids=["near", "far"]
 )
 def test_returns_of_very_different_size_get_a_logarithmic_scale(deepest, scale):
-    drawing = curves_figure(episode_table(CHOSEN, deepest=deepest), CHOSEN)
+    drawing = drawn_from(episodes_of(deepest=deepest))
     assert {axes.get_yscale() for axes in drawing.axes} == {scale}
     drawing.draw_without_rendering()
     labels = [label.get_text() for label in drawing.axes[0].get_yticklabels()]
@@ -51,7 +115,7 @@ def test_returns_of_very_different_size_get_a_logarithmic_scale(deepest, scale):
 
 @pytest.mark.parametrize("shape", [{"trials": 1}, {"episodes": 1}, {"trials": 1, "episodes": 1}])
 def test_a_single_trial_or_episode_is_drawn_too(shape):
-    drawing = curves_figure(episode_table(CHOSEN, **shape), CHOSEN)
+    drawing = drawn_from(episodes_of(**shape))
     drawing.draw_without_rendering()
     assert all(np.isfinite(line.get_ydata()).all() for line in drawing.axes[0].lines)
 

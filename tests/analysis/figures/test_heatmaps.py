@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from qbumpers.analysis.figures.heatmaps import heatmap_figure
+from qbumpers.analysis.figures.heatmaps import cell_counts, heatmap_figure
 
 CONDITIONS = ["none", "stochastic-q-bumpers/alpha=0.7"]
 COUNTS = ("assisted", "overridden", "unassisted")
@@ -25,15 +25,24 @@ def states():
     return pl.concat(parts)
 
 
+def drawn_from(table, conditions=CONDITIONS):
+    return heatmap_figure(cell_counts(table, conditions, EPISODES))
+
+
+def maps_of(drawing):
+    """Maps row by row, each row from left to right."""
+    images = drawing.axes[0].images
+    return sorted(images, key=lambda image: (image.get_extent()[2], image.get_extent()[0]))
+
+
 def test_every_condition_is_a_row_of_three_maps_of_steps_an_episode():
     table = states()
-    drawing = heatmap_figure(table.sample(fraction=1, shuffle=True, seed=1), CONDITIONS, EPISODES)
-    panels = [axes for axes in drawing.axes if axes.images]
-    assert len(panels) == 2 * 3
-    for axes, (condition, name) in zip(
-        panels, [(c, n) for c in CONDITIONS for n in COUNTS], strict=True
+    maps = maps_of(drawn_from(table.sample(fraction=1, shuffle=True, seed=1)))
+    assert len(maps) == 2 * 3
+    for image, (condition, name) in zip(
+        maps, [(c, n) for c in CONDITIONS for n in COUNTS], strict=True
     ):
-        shown = axes.images[0].get_array()
+        shown = image.get_array()
         by_hand = np.zeros((ROWS, COLUMNS))
         for row in table.filter(condition=condition).iter_rows(named=True):
             by_hand[row["row"], row["column"]] = row[name] / EPISODES
@@ -41,22 +50,36 @@ def test_every_condition_is_a_row_of_three_maps_of_steps_an_episode():
         assert shown.filled(0) == pytest.approx(by_hand)
 
 
-def test_rows_and_panels_are_named_and_share_one_scale():
-    drawing = heatmap_figure(states(), CONDITIONS, EPISODES)
-    panels = [axes for axes in drawing.axes if axes.images]
-    titles = [axes.get_title(loc="left") for axes in panels]
-    assert titles[0].startswith("No assistance\n")
-    assert titles[3].startswith("Stochastic Q Bumpers, α = 0.7\n")
-    for row in (titles[:3], titles[3:]):
-        assert row[0].endswith("steps with the assistant")
-        assert row[1:] == ["overridden steps", "steps without it"]
-    assert len({axes.images[0].norm for axes in panels}) == 1
+def test_maps_stand_apart_with_square_cells():
+    extents = np.array([image.get_extent() for image in maps_of(drawn_from(states()))])
+    left, right, bottom, top = extents.T
+    assert right - left == pytest.approx(COLUMNS)
+    assert bottom - top == pytest.approx(ROWS)
+    assert (left[1:3] > right[:2]).all()
+    assert (top[3:] > bottom[:3]).all()
+
+
+def test_rows_and_maps_are_named_and_share_one_scale():
+    drawing = drawn_from(states())
+    texts = sorted(drawing.axes[0].texts, key=lambda t: t.get_position()[::-1])
+    maps = ["steps with the assistant", "overridden steps", "steps without it"]
+    names = ["No assistance", "Stochastic Q Bumpers, α = 0.7"]
+    assert [text.get_text() for text in texts] == [names[0], *maps, names[1], *maps]
+    assert len({image.norm for image in maps_of(drawing)}) == 1
     [bar] = [axes for axes in drawing.axes if not axes.images]
     assert bar.get_xlabel() == "steps an episode"
 
 
+def test_the_numbers_behind_the_maps_are_in_the_order_asked_for():
+    counts = cell_counts(states(), CONDITIONS[::-1], EPISODES)
+    assert counts["condition"].unique(maintain_order=True).to_list() == CONDITIONS[::-1]
+    first = counts.row(0, named=True)
+    [state] = states().filter(condition=CONDITIONS[1], state=0).to_dicts()
+    assert (first["row"], first["column"]) == (0, 0)
+    assert first["assisted"] == state["assisted"] / EPISODES
+
+
 def test_a_condition_that_was_never_overridden_is_drawn_all_grey():
-    table = states().with_columns(overridden=pl.lit(0))
-    drawing = heatmap_figure(table, CONDITIONS[:1], EPISODES)
+    drawing = drawn_from(states().with_columns(overridden=pl.lit(0)), CONDITIONS[:1])
     drawing.draw_without_rendering()
-    assert drawing.axes[1].images[0].get_array().mask.all()
+    assert maps_of(drawing)[1].get_array().mask.all()

@@ -4,18 +4,18 @@ import re
 from xml.etree import ElementTree
 
 import matplotlib as mpl
-import numpy as np
 import pytest
 from PIL import Image
 
 from qbumpers.analysis.figures.style import (
     NAMES,
-    colour,
+    assistant_of,
     figure,
-    label_in_column,
-    marker,
+    looks,
     readable,
     save,
+    setting,
+    stretch,
 )
 
 
@@ -55,13 +55,22 @@ def test_drawing_leaves_the_users_own_style_alone():
 
 
 def test_assistants_are_told_apart_by_colour_and_by_marker():
-    looks = [(colour(name), marker(name)) for name in NAMES]
-    assert len({ink for ink, _ in looks}) == len({shape for _, shape in looks}) == 4
-    own = (colour("my-own-rule"), marker("my-own-rule"))
-    assert own == (colour("my-own-rule"), marker("my-own-rule"))
-    assert own[0] not in {ink for ink, _ in looks}
-    assert own[1] not in {shape for _, shape in looks}
-    assert re.fullmatch("#[0-9a-f]{6}", own[0])
+    own = ["one-rule", "eno-rule"]  # of equal letters
+    drawn = looks([*NAMES, *own])
+    assert list(drawn) == [*NAMES, *own]
+    assert len({look.colour for look in drawn.values()}) == len(drawn)
+    assert len({look.marker for look in drawn.values()}) == len(drawn)
+    assert all(re.fullmatch("#[0-9a-f]{6}", look.colour) for look in drawn.values())
+
+
+def test_twenty_rules_of_ones_own_all_look_different():
+    drawn = looks(f"rule-{index}" for index in range(20))
+    assert len(set(drawn.values())) == 20
+
+
+def test_what_an_assistant_looks_like_does_not_depend_on_how_often_it_is_named():
+    once, often = looks(["own", "none", "other"]), looks(["own", "own", "none", "other", "own"])
+    assert once == often
 
 
 @pytest.mark.parametrize(
@@ -77,29 +86,24 @@ def test_conditions_are_called_readably(condition, text):
     assert readable(condition) == text
 
 
-@pytest.mark.parametrize("count", [1, 5, 14])
-def test_labels_of_a_cluster_stand_apart_within_the_axes_in_the_order_of_their_points(count):
-    generator = np.random.default_rng(count)
-    points = np.stack([np.full(count, 50.0), generator.uniform(-500, -480, count)], axis=1)
-    with figure(4, 3) as drawing:
-        axes = drawing.subplots()
-        axes.set(xlim=(40, 60), ylim=(-700, -300))
-        label_in_column(axes, points, [f"p{i}" for i in range(count)], at=0.8, ink="#000000")
-    notes = {note.get_text(): note for note in axes.texts}
-    assert {note.xy for note in notes.values()} == {tuple(point) for point in points}
-    assert {note.xyann[0] for note in notes.values()} == {0.8}
-    heights = [notes[f"p{index}"].xyann[1] for index in np.argsort(points[:, 1])]
-    assert heights == sorted(heights)
-    assert all(0 < height < 1 for height in heights)
-    assert count == 1 or min(np.diff(heights)) > 0.05  # a line of text is lower
+def test_the_learner_is_left_out_of_a_conditions_name():
+    condition = "stochastic-q-bumpers/alpha=0.7,p_max=0.8@perception=observant"
+    assert readable(condition) == "Stochastic Q Bumpers, α = 0.7, p_max=0.8"
+    assert setting(condition) == "α = 0.7, p_max=0.8"
+    assert assistant_of(condition) == "stochastic-q-bumpers"
+    assert (readable("none@penalty=2"), setting("none@penalty=2")) == ("No assistance", "")
+    assert assistant_of("none@penalty=2") == "none"
 
 
-def test_more_labels_than_fit_still_stay_within_the_axes():
-    points = np.stack([np.zeros(30), np.linspace(0.9, 1, 30)], axis=1)
-    with figure(4, 3) as drawing:
-        axes = drawing.subplots()
-        label_in_column(axes, points, ["x"] * 30, at=0.8, ink="#000000")
-    heights = [note.xyann[1] for note in axes.texts]
-    assert min(heights) > 0
-    assert max(heights) < 1
-    assert len(set(heights)) == 30
+@pytest.mark.parametrize(("axis", "limit"), [("x", 1000), ("y", 300)])
+def test_only_returns_of_very_different_size_are_stretched(axis, limit):
+    for deepest, scale in ((-0.9 * limit, "linear"), (-1.1 * limit, "symlog")):
+        with figure(4, 3) as drawing:
+            axes = drawing.subplots()
+            axes.plot([0, deepest], [0, deepest])
+            axes.margins(0)
+            stretch(axes, axis)
+        assert {"x": axes.get_xscale(), "y": axes.get_yscale()}[axis] == scale
+    along = axes.xaxis if axis == "x" else axes.yaxis
+    for place, label in zip(along.get_ticklocs(), along.get_ticklabels(), strict=True):
+        assert float(label.get_text().replace(",", "").replace("\N{MINUS SIGN}", "-")) == place

@@ -1,7 +1,7 @@
 """Learning against performance: Figure 2 of the paper, made to be read."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -9,148 +9,194 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from qbumpers.analysis.figures.style import (
-    NAMES,
-    colour,
-    figure,
-    label_in_column,
-    marker,
-)
+from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN, label_in_column, room_for_labels
+from qbumpers.analysis.figures.style import NAMES, Look, figure, setting
 
-_AXES = ("mean return with the assistant", "mean return without it")
+_AXES = {"xlabel": "mean return with the assistant", "ylabel": "mean return without it"}
+_MAIN_SIZE = np.array([9.0, 4.6])  # of the main panel, in inches, about
+_CLUSTER = 3  # so many labels without room make a cluster, which is enlarged
+_RING: Any = {"marker": "o", "markerfacecolor": "none", "color": "#222222"}
+_STAR: Any = {"marker": "*", "markerfacecolor": "none", "linestyle": "none"}
 
 
-def frontier_figure(summary: pl.DataFrame, published: Sequence[Mapping[str, Any]] = ()) -> Figure:
-    """Unassisted against assisted return of every condition, with 95% intervals.
+class _Content(NamedTuple):
+    points: pl.DataFrame
+    published: Sequence[Mapping[str, Any]]
+    looks: Mapping[str, Look]
 
-    Above, the assistants that override; below, all conditions, and a tight cluster enlarged.
+
+def frontier_figure(
+    points: pl.DataFrame,
+    drawn: Mapping[str, Look],
+    published: Sequence[Mapping[str, Any]] = (),
+) -> Figure:
+    """Unassisted against assisted return of every condition of one learner, with 95% intervals.
+
+    Above, the assistants that override; below, all conditions, and tight clusters enlarged.
 
     Args:
-        summary: the table of `summary.csv`.
-        published: printed numbers (condition, measure, value), drawn hollow.
+        points: a row a condition: condition, assistant, `assisted_` and `unassisted_` mean, low
+            and high, overrides_mean, pareto.
+        drawn: looks of the assistants.
+        published: printed numbers (condition, measure, value), drawn as hollow stars.
 
     Returns:
         The figure.
     """
-    overriding = summary.filter(pl.col("overrides_mean") > 0)
-    swept = overriding.filter(pl.col("condition").str.contains("/", literal=True))
-    if swept.height:
-        overriding = swept
-    cluster = tightest_cluster(overriding)
-    with figure(10, 10.5 if overriding.height else 5) as drawing:
-        if not overriding.height:
-            _everything(drawing.subplots(), summary)
-            return drawing
-        grid = drawing.add_gridspec(2, 2, height_ratios=(1.25, 1))
-        main = drawing.add_subplot(grid[0, :])
-        _main(main, overriding, published, cluster)
-        _everything(drawing.add_subplot(grid[1, 0]), summary)
-        if cluster.height:
-            _cluster(drawing.add_subplot(grid[1, 1]), cluster, published)
+    content = _Content(points, published, drawn)
+    main = overriding(points)
+    if main.height in (0, points.height):
+        main = points
+    limits = _limits(main, content)
+    offsets = _label_offsets(main, limits, content)
+    clusters = _clusters(main, offsets)
+    below = [points] * (main.height < points.height) + clusters
+    with figure(10, 10.5 if below else 6) as drawing:
+        parts = drawing.subfigures(2 if below else 1, 1, squeeze=False)[:, 0]
+        axes = parts[0].subplots()
+        _draw(axes, main, content, 6)
+        _label(axes, main, offsets, clusters, content)
+        axes.set(title="All conditions" if main is points else "Assistants that override")
+        axes.set(xlim=limits[0], ylim=limits[1])
+        panels = parts[1].subplots(1, len(below), squeeze=False)[0] if below else []
+        for panel, rows in zip(panels, below, strict=True):
+            if rows is points:
+                _draw(panel, rows, content._replace(published=()), 5)
+                panel.set(title="All conditions")
+            else:
+                _draw(panel, rows, content, 5)
+                _enlarge(panel, rows, content)
+        drawing.legend(handles=_legend(content), loc="outside upper left", ncols=4)
     return drawing
 
 
-def tightest_cluster(summary: pl.DataFrame) -> pl.DataFrame:
-    """The conditions of one assistant that lie too close together to be labelled among the others.
-
-    Args:
-        summary: rows of overriding conditions.
-
-    Returns:
-        Its rows where at least five conditions of it share a tenth of the range of assisted
-        returns; else no rows.
-    """
-    if summary.height < 2:
-        return summary.head(0)
-    reach = np.ptp(summary["assisted_mean"].to_numpy())
-    for part in summary.partition_by("assistant", maintain_order=True):
-        if part.height >= 5 and np.ptp(part["assisted_mean"].to_numpy()) < 0.1 * reach:
-            return part
-    return summary.head(0)
+def overriding(points: pl.DataFrame) -> pl.DataFrame:
+    """Conditions whose assistant overrides; the swept ones of them, where there are any."""
+    found = points.filter(pl.col("overrides_mean") > 0)
+    swept = found.filter(pl.col("condition").str.contains("/", literal=True))
+    return swept if swept.height else found
 
 
-def _draw_points(axes: Axes, rows: pl.DataFrame, size: float = 6) -> None:
+def _places(rows: pl.DataFrame) -> np.ndarray:
+    return rows.select("assisted_mean", "unassisted_mean").to_numpy()
+
+
+def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> None:
+    """Points with their intervals, rings around Pareto-optimal ones, and what they bound."""
     for part in rows.partition_by("assistant", maintain_order=True):
         name = str(part["assistant"][0])
-        x, y = part["assisted_mean"].to_numpy(), part["unassisted_mean"].to_numpy()
+        centres = _places(part).T
         margins = [
             np.nan_to_num(
                 np.abs(part.select(f"{m}_low", f"{m}_high").cast(pl.Float64).to_numpy().T - centre)
             )
-            for m, centre in (("assisted", x), ("unassisted", y))
+            for m, centre in zip(("assisted", "unassisted"), centres, strict=True)
         ]
         axes.errorbar(
-            x, y, xerr=margins[0], yerr=margins[1], fmt=marker(name), color=colour(name),
-            markersize=size, elinewidth=1, alpha=0.9, label=NAMES.get(name, name),
+            *centres, xerr=margins[0], yerr=margins[1], fmt=content.looks[name].marker,
+            color=content.looks[name].colour, markersize=size, elinewidth=1, alpha=0.9,
+            label=NAMES.get(name, name),
         )  # fmt: skip
+    axes.plot(*_places(rows.filter("pareto")).T, linestyle="none", markersize=2.1 * size, **_RING)
+    for place, ink in _printed(rows, content):
+        axes.plot(*place, markersize=17, markeredgewidth=1.6, color=ink, zorder=5, **_STAR)
+    best = _places(content.points.filter("pareto").sort("assisted_mean")).T
+    axes.plot(
+        *best, ":", color="#777777", linewidth=1, drawstyle="steps-pre", zorder=1, scalex=False,
+        scaley=False,
+    )  # fmt: skip
+    axes.set(**_AXES)
 
 
-def _draw_published(axes: Axes, rows: pl.DataFrame, published: Sequence[Mapping[str, Any]]) -> None:
-    """Printed points, hollow; a condition needs both numbers to be one."""
+def _printed(rows: pl.DataFrame, content: _Content) -> list[tuple[tuple[float, float], str]]:
+    """Printed points and their colours; a condition needs both numbers to be one."""
+    found = []
     for condition, name in rows.select("condition", "assistant").iter_rows():
-        numbers = {n["measure"]: n["value"] for n in published if n["condition"] == condition}
+        numbers = {
+            n["measure"]: n["value"] for n in content.published if n["condition"] == condition
+        }
         if len(numbers) == 2:
-            axes.plot(
-                numbers["assisted"], numbers["unassisted"], marker="*", markersize=17,
-                markerfacecolor="none", markeredgecolor=colour(name), markeredgewidth=1.6,
-                linestyle="none", zorder=5,
-            )  # fmt: skip
+            place = (numbers["assisted"], numbers["unassisted"])
+            found.append((place, content.looks[name].colour))
+    return found
 
 
-def _label(row: Mapping[str, Any]) -> str:
+def _legend(content: _Content) -> list[Line2D]:
+    handles = [
+        Line2D([], [], marker=look.marker, color=look.colour, label=NAMES.get(name, name))
+        for name, look in content.looks.items()
+        if name in content.points["assistant"]
+    ]
+    ring = Line2D([], [], linestyle=":", markersize=11, label="Pareto-optimal", **_RING)
+    star = Line2D([], [], markersize=13, color="#555555", label="as printed in the paper", **_STAR)
+    return [*handles, ring] + [star] * bool(_printed(content.points, content))
+
+
+def _limits(rows: pl.DataFrame, content: _Content) -> np.ndarray:
+    """Limits of axes that hold all intervals and printed points; float64 [2, 2]."""
+    printed = np.array([place for place, _ in _printed(rows, content)]).reshape(-1, 2)
+    limits = []
+    for axis, measure in enumerate(("assisted", "unassisted")):
+        ends = rows.select(f"{measure}_{part}" for part in ("mean", "low", "high"))
+        values = np.append(ends.cast(pl.Float64).to_numpy().ravel(), printed[:, axis])
+        low, high = np.nanmin(values), np.nanmax(values)
+        room = 0.06 * (high - low) or 1.0
+        limits.append((low - room, high + room))
+    return np.array(limits)
+
+
+def _label_offsets(rows: pl.DataFrame, limits: np.ndarray, content: _Content) -> np.ndarray:
+    """Where labels of the main panel may stand, from their points in inches; float64 [N, 2]."""
+    order = np.argsort(~rows["pareto"].to_numpy(), kind="stable")
+    labels = [_name(str(rows["condition"][int(index)])) for index in order]
+    printed = np.array([place for place, _ in _printed(rows, content)]).reshape(-1, 2)
+    points = np.concatenate([_places(rows)[order], printed])
+    places = (points - limits[:, 0]) / np.ptp(limits, axis=1) * _MAIN_SIZE
+    offsets = np.full((rows.height, 2), np.nan)
+    offsets[order] = room_for_labels(places, labels, _MAIN_SIZE)
+    return offsets
+
+
+def _clusters(rows: pl.DataFrame, offsets: np.ndarray) -> list[pl.DataFrame]:
+    """The conditions of each assistant that lie too close together for their labels; two at most.
+
+    Args:
+        rows: of the main panel.
+        offsets: of their labels, NaN where there is no room.
+    """
+    marked = rows.with_columns(crowded=pl.Series(np.isnan(offsets[:, 0])))
+    parts = marked.partition_by("assistant", maintain_order=True)
+    return [part for part in parts if part["crowded"].sum() >= _CLUSTER][:2]
+
+
+def _name(condition: str) -> str:
     """What tells a condition from others of its assistant."""
-    if row.get("alpha") is not None:
-        return f"α = {row['alpha']:g}"
-    return str(row["condition"]).partition("/")[2]
+    return setting(condition) or NAMES.get(condition, condition)
 
 
-def _main(
+def _label(
     axes: Axes,
     rows: pl.DataFrame,
-    published: Sequence[Mapping[str, Any]],
-    cluster: pl.DataFrame,
+    offsets: np.ndarray,
+    clusters: Sequence[pl.DataFrame],
+    content: _Content,
 ) -> None:
-    _draw_points(axes, rows)
-    _draw_published(axes, rows, published)
-    clustered = set(cluster["condition"]) if cluster.height else set()
-    for row in rows.iter_rows(named=True):
-        if row["condition"] not in clustered:
+    enlarged = {name for part in clusters for name in part["assistant"]}
+    for row, offset in zip(rows.iter_rows(named=True), 72 * offsets, strict=True):
+        if row["assistant"] not in enlarged and np.isfinite(offset[0]):
             axes.annotate(
-                _label(row), (row["assisted_mean"], row["unassisted_mean"]),
-                xytext=(7, 7), textcoords="offset points", fontsize=9,
-                color=colour(row["assistant"]),
+                _name(row["condition"]), (row["assisted_mean"], row["unassisted_mean"]),
+                xytext=tuple(offset), textcoords="offset points", fontsize=9, ha="center",
+                va="center", color=content.looks[row["assistant"]].colour,
             )  # fmt: skip
-    axes.set(xlabel=_AXES[0], ylabel=_AXES[1], title="Assistants that override")
-    axes.margins(x=0.08)
-    handles, labels = axes.get_legend_handles_labels()
-    if published:
-        star = Line2D(
-            [], [], marker="*", markersize=13, color="#555555", fillstyle="none", linestyle=""
-        )
-        handles, labels = [*handles, star], [*labels, "as printed in the paper"]
-    axes.legend(handles, labels, loc="lower left")
-    axes.annotate(
-        "better", xy=(0.985, 0.965), xytext=(0.93, 0.87), xycoords="axes fraction",
-        textcoords="axes fraction", ha="right", fontsize=9, color="#555555",
-        arrowprops={"arrowstyle": "->", "color": "#555555"},
-    )  # fmt: skip
 
 
-def _everything(axes: Axes, summary: pl.DataFrame) -> None:
-    _draw_points(axes, summary, size=5)
-    axes.set(xlabel=_AXES[0], ylabel=_AXES[1], title="All conditions")
-    axes.legend(loc="lower left", fontsize=9)
-
-
-def _cluster(axes: Axes, rows: pl.DataFrame, published: Sequence[Mapping[str, Any]]) -> None:
+def _enlarge(axes: Axes, rows: pl.DataFrame, content: _Content) -> None:
+    """Look closely at a cluster; labels stand beside it, of Pareto-optimal conditions first."""
     name = str(rows["assistant"][0])
-    points = rows.select("assisted_mean", "unassisted_mean").to_numpy()
-    _draw_points(axes, rows, size=5)
-    _draw_published(axes, rows, published)
-    low, high = points[:, 0].min(), points[:, 0].max()
-    room = max(high - low, 1e-9)
-    axes.set_xlim(low - 0.9 * room, high + 1.5 * room)
-    labels = [_label(row) for row in rows.iter_rows(named=True)]
-    label_in_column(axes, points, labels, at=0.82, ink=colour(name))
-    title = f"{NAMES.get(name, name)}, enlarged"
-    axes.set(xlabel=_AXES[0], ylabel=_AXES[1], title=title)
+    (low, high), heights = _limits(rows, content._replace(published=()))
+    axes.set(xlim=(low, high + 0.6 * (high - low)), ylim=heights)
+    chosen = rows.sort("pareto", descending=True, maintain_order=True).head(MOST_IN_A_COLUMN)
+    labels = [_name(str(condition)) for condition in chosen["condition"]]
+    label_in_column(axes, _places(chosen), labels, at=0.78, ink=content.looks[name].colour)
+    axes.set(title=NAMES.get(name, name))

@@ -2,22 +2,27 @@
 
 from collections.abc import Sequence
 
+import matplotlib as mpl
 import numpy as np
 import polars as pl
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from qbumpers.analysis.figures.style import figure, readable
 
-_PANELS = (
-    ("assisted", "steps with the assistant"),
-    ("overridden", "overridden steps"),
-    ("unassisted", "steps without it"),
-)
+_PANELS = {
+    "assisted": "steps with the assistant",
+    "overridden": "overridden steps",
+    "unassisted": "steps without it",
+}
+_TICKS = (0.001, 0.01, 0.1, 1, 10)
+_WIDTH, _GAP = 10, 0.04  # of the figure in inches; between maps, of a map's width
+_COLOURS = mpl.colormaps["viridis"].with_extremes(bad="#e9e9e9")
 
 
-def heatmap_figure(states: pl.DataFrame, conditions: Sequence[str], episodes: int) -> Figure:
-    """Steps an episode in each cell of the grid, a row of panels a condition.
+def cell_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) -> pl.DataFrame:
+    """Steps an episode in each cell of a grid.
 
     Args:
         states: as in `states.parquet`, of a task on a grid.
@@ -25,28 +30,49 @@ def heatmap_figure(states: pl.DataFrame, conditions: Sequence[str], episodes: in
         episodes: over all trials of a condition; counts are divided by it.
 
     Returns:
+        A row a condition and cell: condition, row, column, assisted, overridden, unassisted.
+    """
+    chosen = states.filter(pl.col("condition").is_in(list(conditions)))
+    order = pl.col("condition").replace_strict({c: i for i, c in enumerate(conditions)})
+    return chosen.sort(order, "state").select(
+        "condition", "row", "column", *(pl.col(name) / episodes for name in _PANELS)
+    )
+
+
+def heatmap_figure(counts: pl.DataFrame) -> Figure:
+    """Steps an episode in each cell of the grid, a row of maps a condition.
+
+    Args:
+        counts: from `cell_counts`.
+
+    Returns:
         The figure; grey cells were never entered.
     """
-    rows, columns = (int(states[name].to_numpy().max()) + 1 for name in ("row", "column"))
-    height = 0.75 + len(conditions) * (0.55 + 3.4 * rows / columns)
-    norm = LogNorm(1e-3, 10, clip=True)
-    with figure(11, height) as drawing:
-        panels = drawing.subplots(len(conditions), len(_PANELS), squeeze=False)
-        image = None
-        for axes_row, condition in zip(panels, conditions, strict=True):
-            chosen = states.filter(pl.col("condition") == condition).sort("state")
-            for axes, (column, title) in zip(axes_row, _PANELS, strict=True):
-                counts = chosen[column].to_numpy().reshape(rows, columns) / episodes
-                cells = np.ma.masked_equal(counts, 0)
-                image = axes.imshow(cells, norm=norm, cmap="viridis")
-                axes.set(xticks=[], yticks=[], facecolor="#ececec")
-                axes.spines[:].set_visible(False)
-                axes.grid(visible=False)
-                axes.set_title(title, fontsize=9, fontweight="normal")
-            axes_row[0].set_title(f"{readable(condition)}\n{_PANELS[0][1]}", fontsize=9)
-        if image is not None:
-            drawing.colorbar(
-                image, ax=panels.ravel().tolist(), label="steps an episode", location="bottom",
-                shrink=0.5, aspect=40,
+    conditions = counts["condition"].unique(maintain_order=True).to_list()
+    rows, columns = (int(counts[name].to_numpy().max()) + 1 for name in ("row", "column"))
+    maps = counts.select(*_PANELS).to_numpy().reshape(len(conditions), rows, columns, len(_PANELS))
+    # All maps on one pair of axes: a pair for each would take many times as long to draw.
+    inch = (len(_PANELS) * columns + 2 * _GAP * columns) / _WIDTH
+    across, down = (1 + _GAP) * columns, rows + 0.5 * inch
+    norm = LogNorm(_TICKS[0], _TICKS[-1], clip=True)
+    with figure(_WIDTH, len(conditions) * down / inch + 0.7) as drawing:
+        axes = drawing.subplots()
+        for place, panel in np.ndindex(len(conditions), len(_PANELS)):
+            left, low = panel * across, (place + 1) * down
+            axes.imshow(
+                np.ma.masked_equal(maps[place, :, :, panel], 0), norm=norm, cmap=_COLOURS,
+                extent=(left, left + columns, low, low - rows),
             )  # fmt: skip
+            axes.text(left, low - rows - 0.07 * inch, list(_PANELS.values())[panel], fontsize=9)
+            if panel == 0:
+                name = readable(conditions[place])
+                axes.text(left, low - rows - 0.26 * inch, name, fontsize=9, weight="bold")
+        axes.set(xlim=(0, across * len(_PANELS)), ylim=(len(conditions) * down, 0))
+        axes.set_axis_off()
+        bar = drawing.colorbar(
+            ScalarMappable(norm, _COLOURS), ax=axes, label="steps an episode", location="bottom",
+            shrink=0.5, aspect=40,
+        )  # fmt: skip
+        bar.set_ticks(_TICKS, labels=[f"{tick:g}" for tick in _TICKS])
+        bar.minorticks_off()
     return drawing

@@ -1,14 +1,17 @@
 """How every figure looks: legible in print and to colour-blind readers."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 
 from qbumpers.files import write_atomically
 
@@ -20,16 +23,31 @@ NAMES = {
 }
 """Assistants as figures call them."""
 
+
+class Look(NamedTuple):
+    """How an assistant is drawn; colour is never the only sign.
+
+    Attributes:
+        colour: as "#rrggbb".
+        marker: of Matplotlib.
+    """
+
+    colour: str
+    marker: str
+
+
 # Okabe and Ito's palette, which stays distinct under the common colour blindnesses.
-_COLOURS = {
-    "none": "#000000",
-    "maximal": "#7a7a7a",
-    "local-q-thresholding": "#d55e00",
-    "stochastic-q-bumpers": "#0072b2",
+_LOOKS = {
+    "none": Look("#000000", "s"),
+    "maximal": Look("#7a7a7a", "D"),
+    "local-q-thresholding": Look("#d55e00", "^"),
+    "stochastic-q-bumpers": Look("#0072b2", "o"),
 }
-_MARKERS = {"none": "s", "maximal": "D", "local-q-thresholding": "^", "stochastic-q-bumpers": "o"}
-_SPARE_COLOURS = ("#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-_SPARE_MARKERS = ("v", "P", "X", "<")
+# Four colours and five markers: twenty looks before one returns.
+_SPARE_COLOURS = ("#009e73", "#cc79a7", "#b8860b", "#56b4e9")
+_SPARE_MARKERS = ("v", "P", "X", "<", ">")
+DASHES = ("-", "--", ":", "-.")
+"""Lines of one assistant."""
 
 _STYLE: Any = {
     "font.size": 10,
@@ -50,27 +68,65 @@ _STYLE: Any = {
 }
 
 
-def colour(assistant: str) -> str:
-    """The colour of an assistant, by name."""
-    return _COLOURS.get(assistant) or _SPARE_COLOURS[_spare(assistant, len(_SPARE_COLOURS))]
+def looks(assistants: Iterable[str]) -> dict[str, Look]:
+    """How to draw assistants, each differently.
+
+    Args:
+        assistants: names, those of one experiment in its order.
+
+    Returns:
+        The look of each, the same in every figure of the experiment.
+    """
+    names = list(dict.fromkeys(assistants))
+    spare = [name for name in names if name not in _LOOKS]
+    fresh = zip(
+        spare, zip(cycle(_SPARE_COLOURS), cycle(_SPARE_MARKERS), strict=False), strict=False
+    )
+    chosen = _LOOKS | {name: Look(*parts) for name, parts in fresh}
+    return {name: chosen[name] for name in names}
 
 
-def marker(assistant: str) -> str:
-    """The marker of an assistant, by name."""
-    return _MARKERS.get(assistant) or _SPARE_MARKERS[_spare(assistant, len(_SPARE_MARKERS))]
-
-
-def _spare(assistant: str, count: int) -> int:
-    return sum(assistant.encode()) % count
+def assistant_of(condition: str) -> str:
+    """The assistant in a condition's id."""
+    return condition.partition("@")[0].partition("/")[0]
 
 
 def readable(condition: str) -> str:
-    """A condition's id as figures call it, for instance "Stochastic Q Bumpers, α = 0.7"."""
-    name, _, options = condition.partition("/")
+    """A condition's id as figures call it, for instance "Stochastic Q Bumpers, α = 0.7".
+
+    The learner after "@" is left out: every figure is of one learner.
+    """
+    name, _, options = condition.partition("@")[0].partition("/")
     label = NAMES.get(name, name)
-    if not options:
-        return label
-    return f"{label}, " + options.replace("alpha=", "α = ").replace(",", ", ")
+    return f"{label}, {setting(condition)}" if options else label
+
+
+def setting(condition: str) -> str:
+    """The options in a condition's id as figures write them, for instance "α = 0.7"."""
+    options = condition.partition("@")[0].partition("/")[2]
+    return options.replace("alpha=", "α = ").replace(",", ", ")
+
+
+def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
+    """Show returns of very different size: linear within -100..100, logarithmic beyond.
+
+    Args:
+        axes: with everything drawn; left as they are where all returns are small.
+        axis: which one.
+    """
+    along, set_scale = (
+        (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
+    )
+    low, high = along.get_view_interval()
+    limit = 1000 if axis == "x" else 300
+    if low >= -limit and high <= limit:
+        return
+    set_scale("symlog", linthresh=100, linscale=1.2)
+    steps = (1,) if axis == "x" else (1, 3)  # numbers side by side need more room
+    sizes = [step * 10**power for power in range(2, 9) for step in steps]
+    ticks = [tick for tick in (*(-s for s in sizes[::-1]), 0, *sizes) if low <= tick <= high]
+    along.set_ticks(ticks, [f"{tick:,}".replace("-", "\N{MINUS SIGN}") for tick in ticks])
+    along.set_minor_locator(NullLocator())
 
 
 @contextmanager
@@ -99,51 +155,14 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     Returns:
         The path of the PNG.
     """
+    vector, pixels = (folder / f"{name}.{ending}" for ending in ("svg", "png"))
     with mpl.rc_context(_STYLE):
-        for ending, metadata in (("svg", {"Date": None}), ("png", {"Software": None})):
-            write_atomically(
-                folder / f"{name}.{ending}",
-                lambda path, e=ending, m=metadata: drawing.savefig(path, format=e, metadata=m),
-            )
-            drawing.set_layout_engine("none")  # the layout stays; finding it takes longest
-    return folder / f"{name}.png"
-
-
-def label_in_column(axes: Axes, points: np.ndarray, labels: list[str], at: float, ink: str) -> None:
-    """Label a cluster of points in a column beside it, with a line to each point.
-
-    Args:
-        axes: to draw on, with its limits set.
-        points: float64 [N, 2], in data units.
-        labels: N of them.
-        at: horizontal place of the column, as a share of the width of the axes.
-        ink: colour.
-    """
-    low, high = axes.get_ylim()
-    order = np.argsort(points[:, 1])
-    wanted = (points[order, 1] - low) / (high - low)
-    places = _spread_out(wanted, gap=min(0.062, 0.94 / max(1, len(labels))))
-    for place, index in zip(places, order, strict=True):
-        axes.annotate(
-            labels[index],
-            xy=tuple(points[index]),
-            xytext=(at, place),
-            textcoords="axes fraction",
-            fontsize=8,
-            color=ink,
-            va="center",
-            arrowprops={"arrowstyle": "-", "color": ink, "alpha": 0.45, "linewidth": 0.7},
-        )
-
-
-def _spread_out(wanted: np.ndarray, gap: float) -> np.ndarray:
-    """Places near the wanted ones (sorted), at least a gap apart, within [0.03, 0.97]."""
-    places = np.clip(wanted, 0.03, 0.97)
-    for index in range(1, len(places)):
-        places[index] = max(places[index], places[index - 1] + gap)
-    overflow = places[-1] - 0.97
-    if overflow > 0:
-        places[-1] = 0.97
-        for index in range(len(places) - 2, -1, -1):
-            places[index] = min(places[index], places[index + 1] - gap)
-    return places
+        # Once for both, and not by `savefig`, which would draw everything twice for each.
+        drawing.dpi = _STYLE["savefig.dpi"]
+        drawing.draw_without_rendering()
+        drawing.set_layout_engine("none")
+        canvas = FigureCanvasAgg(drawing)
+        write_atomically(pixels, lambda path: canvas.print_png(path, metadata={"Software": None}))
+        outline = FigureCanvasSVG(drawing)
+        write_atomically(vector, lambda path: outline.print_svg(path, metadata={"Date": None}))
+    return pixels

@@ -1,0 +1,169 @@
+"""Every table of a report, from the results of a run."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import polars as pl
+
+from qbumpers.analysis.comparisons import RETURNS, against, methods, optimal, pooled
+from qbumpers.analysis.frontier import Regret, matched_regret
+from qbumpers.analysis.measures import summary, trial_measures, trial_samples
+from qbumpers.analysis.published import Comparison, compare, published_numbers
+from qbumpers.experiments.design import Experiment
+from qbumpers.experiments.store import Results
+
+
+class LearnerFindings(NamedTuple):
+    """What the tables say about one kind of learner; different learners are never mixed.
+
+    Attributes:
+        learner: its id, for instance "q-learning/perception=observant".
+        summary: its rows of `summary.csv`.
+        trials: its rows of `trials.parquet`.
+        frontier: a row a condition: its mean returns with intervals, whether it is Pareto-optimal
+            (`pareto`) and the probability of it.
+        methods: a row a method: `methods.csv`.
+        control: the condition without assistance; None where there is none to compare with.
+        differences: a row a measure and condition, against the control: `differences.csv`; no rows
+            without a control.
+        compared: the method and the baseline of the regrets; None without two swept ones.
+        regrets: by what is matched, "performance" and "learning".
+    """
+
+    learner: str
+    summary: pl.DataFrame
+    trials: pl.DataFrame
+    frontier: pl.DataFrame
+    methods: pl.DataFrame
+    control: str | None
+    differences: pl.DataFrame
+    compared: tuple[str, str] | None
+    regrets: dict[str, Regret]
+
+    @property
+    def label(self) -> str:
+        """What tells the learner from others, for instance "perception=observant"."""
+        return self.learner.partition("/")[2]
+
+
+class Findings(NamedTuple):
+    """What the tables of a report say.
+
+    Attributes:
+        summary: a row a condition.
+        trials: a row a trial.
+        learners: what compares conditions, one for each kind of learner.
+        comparisons: with printed numbers, empty where the experiment reproduces none.
+        headlines: what came out, in plain sentences; empty until `find` of a report adds them.
+        cautions: what to keep in mind, in plain sentences; the same.
+    """
+
+    summary: pl.DataFrame
+    trials: pl.DataFrame
+    learners: list[LearnerFindings]
+    comparisons: list[Comparison]
+    headlines: Sequence[str] = ()
+    cautions: Sequence[str] = ()
+
+    @property
+    def regrets(self) -> dict[str, Regret]:
+        """Regrets by what is matched; none where there are several learners, each with its own."""
+        return self.learners[0].regrets if len(self.learners) == 1 else {}
+
+    @property
+    def methods(self) -> tuple[str, str] | None:
+        """The method and the baseline of the regrets."""
+        return self.learners[0].compared if self.regrets else None
+
+
+def find_tables(results: Results) -> Findings:
+    """Every table of a report, from the results of a run."""
+    experiment = results.experiment
+    options = {n.condition: n.assistant.options._asdict() for n in experiment.conditions()}
+    trials = trial_measures(results.episodes, experiment.criterion)
+    table = summary(results.episodes, trials, options)
+    learners = [
+        _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
+        for index, part in enumerate(table.partition_by("learner", maintain_order=True))
+    ]
+    found = Findings(table, trials, learners, [])
+    if not experiment.reproduces:
+        return found
+    printed = published_numbers(experiment.reproduces)
+    return found._replace(comparisons=compare(printed, table, found.regrets))
+
+
+def _about(
+    index: int, table: pl.DataFrame, trials: pl.DataFrame, experiment: Experiment
+) -> LearnerFindings:
+    paired = experiment.common_random_numbers
+
+    def generator(use: int) -> np.random.Generator:
+        return np.random.default_rng([experiment.seed, index, use])
+
+    best = optimal(trials, generator(0), paired)
+    returns = [f"{measure}_{part}" for measure in RETURNS for part in ("mean", "low", "high")]
+    points = table.select("condition", "assistant", *returns, "overrides_mean")
+    areas = methods(trials, generator(1), paired)
+    for use, measure in enumerate(RETURNS, start=2):
+        means = pooled(trials, measure, generator(use), paired).select(
+            "assistant",
+            pl.selectors.starts_with("macro", "interquartile").name.prefix(f"{measure}_"),
+        )
+        areas = areas.join(means, on="assistant", how="left", maintain_order="left")
+    control = _control(table)
+    compared = _compared(table)
+    return LearnerFindings(
+        learner=str(table["learner"][0]),
+        summary=table,
+        trials=trials,
+        frontier=points.join(
+            best.select("condition", "pareto", "probability"), on="condition", maintain_order="left"
+        ),
+        methods=areas,
+        control=control,
+        differences=_differences(trials, control, paired),
+        compared=compared,
+        regrets=_regrets(table, trials, compared, generator, paired) if compared else {},
+    )
+
+
+def _control(table: pl.DataFrame) -> str | None:
+    """The condition without assistance, where there are others."""
+    controls = table.filter(assistant="none")["condition"]
+    return str(controls[0]) if len(controls) and table.height > 1 else None
+
+
+def _differences(trials: pl.DataFrame, control: str | None, paired: bool) -> pl.DataFrame:
+    if control is None:
+        return pl.DataFrame()
+    parts = [
+        against(trials, control, measure, paired).select(pl.lit(measure).alias("measure"), pl.all())
+        for measure in RETURNS
+    ]
+    return pl.concat(parts, how="vertical_relaxed")
+
+
+def _compared(table: pl.DataFrame) -> tuple[str, str] | None:
+    """The last swept method of an experiment, and the one before it as its baseline."""
+    overriding = table.filter(pl.col("overrides_mean") > 0)
+    counts = overriding.group_by("assistant", maintain_order=True).len()
+    swept = counts.filter(pl.col("len") > 1)["assistant"].to_list()
+    return (swept[-1], swept[-2]) if len(swept) > 1 else None
+
+
+def _regrets(
+    table: pl.DataFrame,
+    trials: pl.DataFrame,
+    compared: tuple[str, str],
+    generator: Callable[[int], np.random.Generator],
+    paired: bool,
+) -> dict[str, Regret]:
+    overriding = table.filter(pl.col("overrides_mean") > 0)
+    ours, theirs = (overriding.filter(assistant=name)["condition"].to_list() for name in compared)
+    samples = trial_samples(trials, *RETURNS)
+    return {
+        matched: matched_regret(samples, ours, theirs, axis, generator(4 + axis), paired)
+        for axis, matched in enumerate(("performance", "learning"))
+    }

@@ -1,0 +1,1 @@
+"""The page of a report: its sentences, tables, figures and layout."""

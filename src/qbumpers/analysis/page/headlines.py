@@ -1,0 +1,191 @@
+"""What came out of an experiment, and what to keep in mind, in plain sentences."""
+
+from collections.abc import Iterator, Mapping
+from math import isnan
+from typing import Any
+
+import polars as pl
+
+from qbumpers.analysis.figures.style import NAMES, readable, setting
+from qbumpers.analysis.findings import Findings, LearnerFindings
+from qbumpers.analysis.frontier import Regret
+from qbumpers.analysis.numerals import digits_for, per_cent, written
+from qbumpers.experiments.design import Experiment
+
+FEW_TRIALS = 20
+"""With fewer trials, intervals are rough."""
+
+
+def headlines(findings: Findings) -> list[str]:
+    """What came out, the most important first.
+
+    Args:
+        findings: the tables.
+
+    Returns:
+        Sentences; those on one of several learners begin with what tells it from the others.
+    """
+    return [
+        f"With {about.label}: {sentence}" if about.label else sentence
+        for about in findings.learners
+        for sentence in _about(about)
+    ]
+
+
+def _about(about: LearnerFindings) -> Iterator[str]:
+    for matched, regret in about.regrets.items():
+        yield _regret(matched, regret, *(about.compared or ("", "")))
+    if about.methods.height > 1 and about.summary["trials"].to_numpy().min() > 1:
+        yield from _largest(about.methods)
+    for part in about.summary.partition_by("assistant", maintain_order=True):
+        yield _best_settings(_helping(part))
+    if about.control and about.differences["simultaneous_low"].null_count() == 0:
+        yield _against_control(about.differences)
+
+
+def _helping(rows: pl.DataFrame) -> pl.DataFrame:
+    """Settings that override at all; every one where none does."""
+    helping = rows.filter(pl.col("overrides_mean") > 0)
+    return helping if helping.height else rows
+
+
+def _name(assistant: str) -> str:
+    return NAMES.get(assistant, assistant)
+
+
+def _largest(methods: pl.DataFrame) -> Iterator[str]:
+    """Which method covers most, as a share of what all conditions cover together."""
+    best = methods.sort("hypervolume_mean", descending=True).row(0, named=True)
+    if best["share"]:
+        name, largest = _name(best["assistant"]), per_cent(best["largest"])
+        yield (
+            f"{name} covers {per_cent(best['share'])} of the performance and learning that all "
+            f"conditions cover together, the most of all methods (in {largest} of the resamples)."
+        )
+
+
+def _best_settings(rows: pl.DataFrame) -> str:
+    """Where an assistant teaches best, and where it performs best."""
+    name = _name(str(rows["assistant"][0]))
+    learning = rows.sort("unassisted_mean", descending=True).row(0, named=True)
+    performing = rows.sort("assisted_mean", descending=True).row(0, named=True)
+    if rows.height == 1:
+        return f"{readable(learning['condition'])} returns {_returns(learning)}."
+    at_learning, at_performing = (setting(row["condition"]) for row in (learning, performing))
+    if at_learning == at_performing:
+        return f"{name} both teaches and performs best at {at_learning}: {_returns(learning)}."
+    return (
+        f"{name} teaches best at {at_learning}: {_returns(learning)}; and performs best at "
+        f"{at_performing}: {_returns(performing)}."
+    )
+
+
+def _returns(row: Mapping[str, Any]) -> str:
+    assisted, unassisted = (_interval(row, measure) for measure in ("assisted", "unassisted"))
+    if row["assistant"] == "none":
+        return f"{assisted} in training and {unassisted} in greedy episodes"
+    return f"{assisted} with it, {unassisted} without it"
+
+
+def _interval(row: Mapping[str, Any], measure: str) -> str:
+    """A mean return and half the width of its interval."""
+    mean, low, high = (row[f"{measure}_{part}"] for part in ("mean", "low", "high"))
+    digits = digits_for(low, high)
+    if low is None:
+        return written(mean, digits)
+    return f"{written(mean, digits)} ± {written((high - low) / 2, digits)}"
+
+
+def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
+    ours, theirs = _name(method), _name(baseline)
+    reduction = regret.reduction
+    if isnan(regret.method.mean):
+        return f"At matched {matched}, no setting of {ours} reaches the level of {theirs}."
+    if isnan(reduction.mean):
+        return f"At matched {matched}, {theirs} is itself the best: it leaves no regret to reduce."
+    compared = {"performance": "learning", "learning": "performance"}[matched]
+    amount = f"{abs(100 * reduction.mean):.0f}% {'less' if reduction.mean >= 0 else 'more'}"
+    interval = "too few trials for an interval"
+    if not isnan(reduction.low):
+        ends = f"{per_cent(reduction.low)} to {per_cent(reduction.high)}"
+        interval = f"95% interval of the reduction {ends}"
+    return (
+        f"At matched {matched}, {ours} has {amount} regret in {compared} than {theirs} "
+        f"({interval})."
+    )
+
+
+def _against_control(differences: pl.DataFrame) -> str:
+    """How many settings surely differ from no assistance."""
+    counts = {
+        (measure, sign): rows.filter(end).height
+        for (measure,), rows in differences.partition_by("measure", as_dict=True).items()
+        for sign, end in (
+            ("better", pl.col("simultaneous_low") > 0),
+            ("worse", pl.col("simultaneous_high") < 0),
+        )
+    }
+    total = differences.filter(measure="assisted").height
+    plural = "s" * (total != 1)
+    return (
+        f"Against no assistance, of {total} condition{plural} {counts['assisted', 'better']} "
+        f"surely perform better and {counts['assisted', 'worse']} worse, "
+        f"{counts['unassisted', 'better']} surely teach better and "
+        f"{counts['unassisted', 'worse']} worse (95% for all at once)."
+    )
+
+
+def cautions(findings: Findings, experiment: Experiment) -> list[str]:
+    """What to keep in mind when reading the results.
+
+    Args:
+        findings: the tables.
+        experiment: as run.
+
+    Returns:
+        Sentences; empty where there is nothing to warn of.
+    """
+    return [*_of_size(experiment), *_of_paper(findings), *_of_ties(findings)]
+
+
+def _of_size(experiment: Experiment) -> Iterator[str]:
+    if experiment.trials == 1:
+        yield "There is one trial a condition: nothing here has an interval."
+    elif experiment.trials < FEW_TRIALS:
+        yield (
+            f"There are only {experiment.trials} trials a condition: intervals are wide, and those "
+            f"from resampling tend to be too narrow below {FEW_TRIALS} trials."
+        )
+    if experiment.episodes == 1:
+        yield "There is one episode a trial: nobody had the time to learn."
+
+
+def _of_paper(findings: Findings) -> Iterator[str]:
+    unlike = [row for row in findings.comparisons if row.agrees is False]
+    if unlike:
+        yield (
+            f"{len(unlike)} of {len(findings.comparisons)} numbers that the paper prints disagree "
+            "with the measured ones."
+        )
+
+
+def _of_ties(findings: Findings) -> Iterator[str]:
+    """Settings whose intervals overlap with the best one's."""
+    close = [text for about in findings.learners for text in _close_settings(about)]
+    if close:
+        yield (
+            "Which setting teaches best is not sure: intervals overlap with the best one's for "
+            f"{'; '.join(close)}. The best of several noisy means flatters itself."
+        )
+
+
+def _close_settings(about: LearnerFindings) -> Iterator[str]:
+    for part in about.summary.partition_by("assistant", maintain_order=True):
+        settings = _helping(part)
+        best = settings.sort("unassisted_mean", descending=True).row(0, named=True)
+        if best["unassisted_low"] is None:
+            continue
+        close = settings.filter(pl.col("unassisted_high") >= best["unassisted_low"]).height
+        if close > 1:
+            where = f" with {about.label}" * bool(about.label)
+            yield f"{close} of {settings.height} settings of {_name(best['assistant'])}{where}"
