@@ -73,8 +73,7 @@ def test_a_failure_exits_with_1_and_one_line(tmp_path):
     status, _, errors = call("run", path, "--out", path / "out")
     assert status == 1
     assert errors == (
-        f"failed: cannot write {path}/out/experiment.toml: Not a directory; "
-        "what is finished is kept\n"
+        f"failed: cannot write {path}/out/.lock: Not a directory; what is finished is kept\n"
     )
 
 
@@ -133,8 +132,8 @@ def test_ctrl_c_keeps_finished_cells_whole(interrupted):
 
 def test_an_unexpected_error_has_a_traceback_only_on_request():
     odd = (
-        "import sys, qbumpers.cli as cli, qbumpers.experiments.design as design\n"
-        "design.load_experiment = lambda path: 1 / 0\n"
+        "import sys, qbumpers.cli as cli, qbumpers.experiments.sources as sources\n"
+        "sources.load_experiment = lambda path, large: 1 / 0\n"
         "cli.main()"
     )
     found = [

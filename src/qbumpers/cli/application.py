@@ -1,0 +1,70 @@
+"""The command `qbumpers` as a whole: its help, its version, and how it ends."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+import qbumpers
+from qbumpers.cli.console import ERRORS, OUTPUT
+from qbumpers.errors import RequestError
+
+application = typer.Typer(
+    name="qbumpers",
+    help="Assistance that lets people learn: simulate it, compare it, reproduce the paper.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@application.callback(invoke_without_command=True)
+def _main_options(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Show where an unexpected error came from.")
+    ] = False,
+) -> None:
+    if version:
+        OUTPUT.print(f"qbumpers {qbumpers.__version__}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line and exit with its status."""
+    try:
+        application()
+    except RequestError as error:
+        _stop(2, "error", str(error))
+    except OSError as error:
+        _stop(1, "failed", f"{error}; what is finished is kept")
+    except Exception as error:
+        if "--traceback" in sys.argv:
+            raise
+        reason = f"{type(error).__name__}: {error}"
+        _stop(1, "failed", f"{reason} (unexpected; 'qbumpers --traceback ...' shows where)")
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[None]:
+    """End at once on Ctrl-C, with a message; Typer by itself would end without one."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _say("stopped", "what is finished is kept; the same command goes on from there")
+        sys.stdout.flush()
+        os._exit(1)  # without waiting for threads whose cells would be thrown away
+
+
+def _stop(status: int, kind: str, message: str) -> None:
+    _say(kind, message)
+    sys.exit(status)
+
+
+def _say(kind: str, message: str) -> None:
+    ERRORS.print(Text.assemble((f"{kind}: ", "bold red"), message), soft_wrap=True)

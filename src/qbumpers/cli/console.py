@@ -1,0 +1,35 @@
+"""What the command line prints, and how numbers look there."""
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+
+OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
+
+
+def table(*columns: str) -> Table:
+    """A plain table; its first column is never broken into lines."""
+    made = Table(box=None, pad_edge=False, header_style="bold", caption_justify="left")
+    for column in columns:
+        made.add_column(column, overflow="fold", no_wrap=column == columns[0])
+    return made
+
+
+def interval(mean: float, low: float | None, high: float | None, digits: int = 1) -> str:
+    """A mean with half the width of its interval, where it has one."""
+    if low is not None and high is not None and 0 < high - low < 0.2:
+        digits = max(digits, 3)  # returns of size 1, for instance
+    if low is None or high is None or not math.isfinite(low):
+        return f"{mean:.{digits}f}"
+    return f"{mean:.{digits}f} \N{PLUS-MINUS SIGN} {(high - low) / 2:.{digits}f}"
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it, for instance "3 s" or "2 h 10 min"."""
+    if seconds < 1:
+        return "less than a second"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -1,0 +1,159 @@
+"""`qbumpers reproduce`, `run` and `report`."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+from rich.table import Table
+
+from qbumpers.cli.application import application, stoppable
+from qbumpers.cli.console import OUTPUT, duration, interval, table
+from qbumpers.cli.progress import TrialProgress
+from qbumpers.cli.working import On, Out, Workers, executor_for
+
+
+@application.command()
+def reproduce(
+    experiment: Annotated[
+        str, typer.Argument(help="Which one: cliff-walking.", metavar="EXPERIMENT")
+    ],
+    profile: Annotated[
+        str,
+        typer.Option(
+            help="Reading of the paper: 'figures' gives its published numbers, 'text' takes its "
+            "text literally.",
+            metavar="figures|text",
+        ),
+    ] = "figures",
+    trials: Annotated[
+        int | None,
+        typer.Option(help="Simulated people a condition.", show_default="the paper's", metavar="N"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of all random streams.", metavar="N")] = 0,
+    workers: Workers = None,
+    on: On = None,
+    out: Out = None,
+) -> None:
+    """Repeat an experiment of the paper and hold the results against its numbers.
+
+    Writes tables, figures and report.html. A run that was stopped continues where it was.
+
+    Example: qbumpers reproduce cliff-walking --trials 20 --out results/quick
+    """
+    from qbumpers.experiments.sources import reproduction
+
+    with stoppable():
+        _run(reproduction(experiment, profile, trials=trials, seed=seed), workers, on, out)
+
+
+@application.command()
+def run(
+    experiment: Annotated[
+        Path, typer.Argument(help="An experiment file.", metavar="EXPERIMENT.toml")
+    ],
+    workers: Workers = None,
+    on: On = None,
+    out: Out = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Run it even if it has more than 10,000 cells of work.")
+    ] = False,
+) -> None:
+    """Run an experiment of your own, described in a TOML file.
+
+    Says what it will do and how long it will take, then writes tables, figures and report.html. A
+    run that was stopped continues where it was; one with more trials or assistants than before
+    computes only what is new.
+
+    Example: qbumpers run frozen-lake.toml --out results/frozen-lake
+    """
+    from qbumpers.experiments.sources import load_experiment
+
+    with stoppable():
+        _run(load_experiment(experiment, large=yes), workers, on, out)
+
+
+@application.command()
+def report(
+    folder: Annotated[str, typer.Argument(help="Results of a finished run.", metavar="DIR")],
+) -> None:
+    """Write tables, figures and report.html of a finished run again."""
+    with stoppable():
+        _analyse(folder)
+
+
+def _run(experiment: Any, workers: int | None, on: str | None, out: str | None) -> None:
+    from qbumpers.experiments.plan import make_plan
+    from qbumpers.experiments.run import run_experiment
+
+    plan = make_plan(experiment)
+    folder = out or f"results/{experiment.name}"
+    alone = f" and {experiment.retention} alone" if experiment.retention else ""
+    OUTPUT.print(
+        f"[bold]{experiment.name}[/bold]: {len(plan.named)} conditions, {experiment.trials} "
+        f"trials of {experiment.episodes} episodes{alone}, into {escape(folder)}",
+        soft_wrap=True,
+    )
+    with executor_for(workers, on) as executor, TrialProgress("simulating", _announce) as progress:
+        run_experiment(plan, folder, executor=executor, report=progress.show)
+    _analyse(folder)
+
+
+def _announce(done: Any) -> None:
+    if done.trials == done.of:
+        OUTPUT.print("All trials are there already.")
+        return
+    there = f"{done.trials:,} are there already, " if done.trials else ""
+    missing = f"{done.of - done.trials:,} to run"
+    expected = f"{duration(done.expected)} by a short calibration"
+    OUTPUT.print(f"{done.of:,} trials: {there}{missing}, {expected}")
+
+
+def _analyse(folder: str) -> None:
+    with OUTPUT.status("analysing") as status:
+        from qbumpers.analysis.report import REPORT, write_report
+        from qbumpers.experiments.store import NEEDED
+        from qbumpers.files import local_copy
+
+        with local_copy(folder, NEEDED) as place:
+            findings = write_report(place, advance=lambda part: status.update(f"writing {part}"))
+    for learner, rows in findings.summary.group_by("learner", maintain_order=True):
+        OUTPUT.print(_summary_table(str(learner[0]), rows))
+    if findings.comparisons:
+        OUTPUT.print(_published_table(findings.comparisons))
+    for sentence in (*findings.headlines, *findings.cautions):
+        OUTPUT.print(f"- {escape(sentence)}", soft_wrap=True)
+    OUTPUT.print(f"Report: [bold]{escape(folder)}/{REPORT}[/bold]", soft_wrap=True)
+
+
+def _summary_table(learner: str, summary: Any) -> Table:
+    """What the conditions of one kind of learner came to, by what tells those apart."""
+    own = learner.partition("/")[2]
+    listing = table("condition", "with help", "alone", "overrides")
+    for column in listing.columns:
+        column.no_wrap = column.header != "condition"  # the narrow give way last
+    if own:
+        listing.title, listing.title_justify = f"Learners with {own}", "left"
+    for row in summary.iter_rows(named=True):
+        cells = [
+            interval(row[f"{measure}_mean"], row[f"{measure}_low"], row[f"{measure}_high"])
+            for measure in ("assisted", "unassisted")
+        ]
+        condition = row["condition"].removesuffix(f"@{own}")
+        listing.add_row(condition, *cells, f"{row['overrides_mean']:.2f}")
+    listing.caption = (
+        "Mean returns with the assistant and without it, and overrides an episode, with 95% "
+        "intervals over trials."
+    )
+    return listing
+
+
+def _published_table(comparisons: Any) -> Table:
+    listing = table("number in the paper", "paper", "measured", "agrees")
+    for row in comparisons:
+        digits = 2 if abs(row.published) < 1 else 1
+        verdict = {True: "yes", False: "[red]no[/red]", None: "-"}[row.agrees]
+        mean, low, high = row.measured
+        measured = interval(mean, low, high, digits)
+        listing.add_row(row.what, row.printed, measured, verdict)
+    return listing
