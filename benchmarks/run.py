@@ -3,8 +3,10 @@
 import os
 import platform
 
+import cluster
 import shared_control
 import simulation
+import sweeps
 import whole_processes
 from measuring import is_quick, show
 
@@ -14,7 +16,7 @@ def main() -> None:
     load = os.getloadavg()[0]
     rows = [
         row
-        for benchmark in (simulation, shared_control, whole_processes)
+        for benchmark in (simulation, shared_control, sweeps, cluster, whole_processes)
         for row in benchmark.measure(quick)
     ]
     machine = f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} when begun"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from measuring import Row, Target, Timed, alternate, compared, is_quick, seconds_of, show
 
-from qbumpers.experiments.design import reproduction
-from qbumpers.experiments.run import make_plan
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.sources import reproduction
 from qbumpers.simulation import run
 
 UNIT = "s"

@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 from PIL import Image
 
 from qbumpers import make_assistant, make_task
-from qbumpers.analysis.figures.style import NAMES, colour, figure, save
+from qbumpers.analysis.figures.style import NAMES, figure, looks, save
 from qbumpers.assistants.stochastic_q_bumpers import override_probability
 from qbumpers.simulation import make_condition, record
 from qbumpers.tasks.cliff_walking import ACTION_NAMES, COLUMNS, as_picture, state_of
@@ -118,7 +118,13 @@ def belief_picture() -> Figure:
         for name, options in ASSISTANTS.items():
             share = share_of_falls(name, options, trials=60)
             episodes = np.arange(1, len(share) + 1)
-            axes.plot(episodes, 100 * share, color=colour(name), linewidth=2, label=NAMES[name])
+            axes.plot(
+                episodes,
+                100 * share,
+                color=looks(NAMES)[name].colour,
+                linewidth=2,
+                label=NAMES[name],
+            )
         axes.set(
             xlabel="episode",
             ylabel="choices beside the cliff\nthat step off it, per cent",

@@ -15,16 +15,17 @@ from matplotlib.figure import Figure
 
 import qbumpers
 from qbumpers import QLearner, Schedule, make_assistant, simulate
-from qbumpers.analysis.figures.curves import curves_figure
-from qbumpers.analysis.figures.style import NAMES, colour, figure, marker, readable
+from qbumpers.analysis.figures.curves import curves_figure, learning_curves
+from qbumpers.analysis.figures.style import NAMES, assistant_of, figure, looks, readable
 from qbumpers.analysis.frontier import Regret, matched_regret
-from qbumpers.analysis.measures import trial_means, trial_samples
+from qbumpers.analysis.measures import trial_measures, trial_samples
 from qbumpers.analysis.published import Comparison, published_numbers
 from qbumpers.analysis.report import Findings, write_report
 from qbumpers.analysis.section_4_1 import threshold_story
 from qbumpers.analysis.statistics import Estimate, mean_interval
-from qbumpers.experiments.design import PROFILES, reproduction
-from qbumpers.experiments.run import make_plan, run_experiment
+from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.run import run_experiment
+from qbumpers.experiments.sources import PROFILES, reproduction
 from qbumpers.experiments.store import Results, load
 from qbumpers.tasks import cliff_walking
 
@@ -67,7 +68,8 @@ def make(folder: Path) -> None:
     summaries = {profile: outcome.findings.summary for profile, outcome in outcomes.items()}
     keep(profiles_figure(summaries), images, "reproduction-profiles")
     shown = ["none", "maximal", LEARNING]
-    keep(curves_figure(figures.results.episodes, shown), images, "learning")
+    curves = learning_curves(figures.results.episodes, shown)
+    keep(curves_figure(curves, looks(NAMES)), images, "learning")
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(DOCS),
         trim_blocks=True,
@@ -102,7 +104,7 @@ def _run(profile: str, images: Path) -> Outcome:
             copy.write_bytes((Path(folder) / "figures" / f"{name}.png").read_bytes())
             shrink(copy)
         results = load(folder)
-    samples = trial_samples(trial_means(results.episodes), "assisted", "unassisted")
+    samples = trial_samples(trial_measures(results.episodes), "assisted", "unassisted")
     return Outcome(findings, results, {name: s.mean(axis=0) for name, s in samples.items()})
 
 
@@ -136,15 +138,13 @@ def printed_points() -> dict[str, np.ndarray]:
 
 def pooled_regret(outcome: Outcome, axis: int) -> Regret:
     """Regret against all thresholds below 1 taken as the one assistant that they are."""
-    samples = trial_samples(trial_means(outcome.results.episodes), "assisted", "unassisted")
-    of = {"local-q-thresholding": {}, "stochastic-q-bumpers": {}}
-    for name, values in samples.items():
-        if name.partition("/")[0] in of and name != NONE:
-            of[name.partition("/")[0]][name] = values
-    best = max(samples, key=lambda name: samples[name].mean(axis=0)[1 - axis])
-    pooled = {"thresholds below 1": np.concatenate(list(of["local-q-thresholding"].values()))}
+    samples = trial_samples(trial_measures(outcome.results.episodes), "assisted", "unassisted")
+    bumpers = [name for name in samples if name.startswith("stochastic-q-bumpers")]
+    below = [name for name in samples if name.startswith("local-q-thresholding") and name != NONE]
+    one = "thresholds below 1"
+    samples[one] = np.concatenate([samples[name] for name in below])
     generator = np.random.default_rng([outcome.results.experiment.seed, axis])
-    return matched_regret(of["stochastic-q-bumpers"], pooled, samples[best], axis, generator)
+    return matched_regret(samples, bumpers, [one], axis, generator)
 
 
 class Change(NamedTuple):
@@ -214,7 +214,7 @@ def tradeoff_figure(summary: pl.DataFrame) -> Figure:
             right.annotate(
                 f"α = {alpha:g}", (row["assisted_mean"][0], row["unassisted_mean"][0]),
                 xytext=place, textcoords="offset points", fontsize=9,
-                color=colour("stochastic-q-bumpers"),
+                color=looks(NAMES)["stochastic-q-bumpers"].colour,
             )  # fmt: skip
         right.legend(loc="lower left")
         right.annotate(
@@ -236,7 +236,7 @@ def profiles_figure(summaries: dict[str, pl.DataFrame]) -> Figure:
             for name, point in printed_points().items():
                 axes.plot(
                     *point, "*", markersize=15, fillstyle="none", markeredgewidth=1.6,
-                    color=colour(name.partition("/")[0]),
+                    color=looks(NAMES)[assistant_of(name)].colour,
                 )  # fmt: skip
             axes.set(title=f"profile {profile}", xlabel="mean return with the assistant")
         panels[0].plot([], [], "*", ms=12, mfc="none", color="#555555", label="in the paper")
@@ -247,9 +247,10 @@ def profiles_figure(summaries: dict[str, pl.DataFrame]) -> Figure:
 
 def _draw_means(axes: Axes, part: pl.DataFrame) -> None:
     name = str(part["assistant"][0])
+    look = looks(NAMES)[name]
     axes.plot(
         part["assisted_mean"], part["unassisted_mean"], linestyle="none", markersize=8,
-        marker=marker(name), color=colour(name), label=NAMES.get(name, name),
+        marker=look.marker, color=look.colour, label=NAMES.get(name, name),
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from PIL import Image
 
 import qbumpers
 from qbumpers.cli import application
-from qbumpers.experiments.design import load_experiment
+from qbumpers.experiments.sources import load_experiment
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -38,6 +38,7 @@ PAGES = {
 RUNNING = ("python", "sh")
 RUN_LANGUAGES = (*RUNNING, "toml", "text")
 INTERNAL = ("assistants.dispatch", "borrowing", "cli", "compilation", "errors", "files")
+INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
 CITED_HOSTS = {"doi.org", "arxiv.org"}
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -228,8 +229,8 @@ def test_the_reference_has_every_module_that_is_not_internal():
         for path in (ROOT / "src" / "qbumpers").rglob("*.py")
         if not path.name.startswith("__")
     }
-    missing = modules - documented() - {f"qbumpers.{name}" for name in INTERNAL}
-    assert missing == set()
+    missing = modules - documented()
+    assert [m for m in missing if not f"{m}.".startswith(INTERNAL_PREFIXES)] == []
 
 
 def test_the_contributors_page_shows_the_layers_and_the_folders_that_there_are():
