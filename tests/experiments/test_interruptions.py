@@ -14,8 +14,9 @@ from qbumpers.errors import RequestError
 from tests.experiments.examples import PLAIN, cells_of, contents_of, run_into, write_toml
 from tests.processes import call, finish, start
 
-# 9 cells of a fraction of a second.
-LONG = {**PLAIN, "episodes": 995, "retention": 5, "trials": 150}
+# Cells of a fraction of a second, of which few are finished before the first kill.
+LONG = {**PLAIN, "episodes": 995, "retention": 5, "trials": 400}
+CELLS = 3 * 8
 FINAL = ("*.parquet", "*.csv", "*.npz", "experiment.toml", "cells/**/*")
 STOPPED = "stopped: what is finished is kept; the same command goes on from there\n"
 
@@ -58,7 +59,7 @@ def stamps(paths):
 
 MOMENTS = {
     "at the start": (lambda folder: lambda: True, 3.0),
-    "in a cell": (one_more_cell, 0.4),
+    "in a cell": (one_more_cell, 0.15),
     "assembling states": (lambda folder: table_begun(folder, "states.parquet"), 0.02),
     "assembling episodes": (lambda folder: table_begun(folder, "episodes.parquet"), 0.02),
     "reporting": (lambda folder: table_begun(folder, "episodes.parquet"), 2.0),
@@ -99,7 +100,7 @@ def uninterrupted(path):
     contents = finished(path, path.with_name("uninterrupted"))
     names = {Path(name).name for name in contents}
     assert names >= {"episodes.parquet", "states.parquet", "summary.csv", "values.npz"}
-    assert len(contents) > 3 * 3 * 2 + len(FINAL)
+    assert len(contents) > CELLS * 2 + len(FINAL)
     return contents
 
 
@@ -110,7 +111,7 @@ def test_a_run_killed_at_random_moments_ends_in_the_same_bytes(path, tmp_path, u
         statuses.append(killed(path, folder, moment, generator))
         kept.append(len(cells_of(folder)))
     assert statuses == [-signal.SIGKILL] * 3
-    assert 0 < kept[0] < kept[1] < kept[2] == 3 * 3 * 2
+    assert 0 < kept[0] < kept[1] < kept[2] == CELLS * 2
     assert finished(path, folder) == uninterrupted
 
 

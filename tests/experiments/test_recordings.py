@@ -82,7 +82,7 @@ def test_infos_have_one_structure_with_an_entry_for_the_reset(recorded):
 WRONG = {
     "condition": (
         {"condition": "stochastic-q-bumpers/alpha=0.2"},
-        r"unknown condition .*did you mean 'stochastic-q-bumpers/alpha=0\.3'",
+        r"unknown condition .*did you mean 'stochastic-q-bumpers/alpha=0\.[37]'",
     ),
     "trial": ({"trials": range(4, 6)}, r"trials = range\(4, 6\); .* 0 to 4, are needed"),
     "no trial": ({"trials": 0}, r"trials = 0; at least 1"),

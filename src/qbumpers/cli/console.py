@@ -33,3 +33,8 @@ def duration(seconds: float) -> str:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def typeable(text: str) -> str:
+    """Text with minus signs that a terminal can be searched for."""
+    return text.replace("\N{MINUS SIGN}", "-")

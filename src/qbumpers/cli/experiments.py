@@ -8,7 +8,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
-from qbumpers.cli.console import OUTPUT, duration, interval, table
+from qbumpers.cli.console import OUTPUT, duration, interval, table, typeable
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
 
@@ -122,7 +122,7 @@ def _analyse(folder: str) -> None:
     if findings.comparisons:
         OUTPUT.print(_published_table(findings.comparisons))
     for sentence in (*findings.headlines, *findings.cautions):
-        OUTPUT.print(f"- {escape(sentence)}", soft_wrap=True)
+        OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
     OUTPUT.print(f"Report: [bold]{escape(folder)}/{REPORT}[/bold]", soft_wrap=True)
 
 
@@ -155,5 +155,5 @@ def _published_table(comparisons: Any) -> Table:
         verdict = {True: "yes", False: "[red]no[/red]", None: "-"}[row.agrees]
         mean, low, high = row.measured
         measured = interval(mean, low, high, digits)
-        listing.add_row(row.what, row.printed, measured, verdict)
+        listing.add_row(row.what, typeable(row.printed), measured, verdict)
     return listing

@@ -3,7 +3,7 @@
 import itertools
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
 from qbumpers.simulation import Steps, record
+from qbumpers.tasks import TabularTask
 from qbumpers.tasks.dynamics import TERMINATED
 
 INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
@@ -47,11 +48,6 @@ def export_recording(
         RequestError: where the folder is not one of a finished run, the condition or a trial is not
             in it, the dataset is there already or badly named, or Minari is not installed.
     """
-    try:
-        import minari
-        from minari.data_collector import EpisodeBuffer
-    except ImportError as error:
-        raise RequestError("Minari is not installed: pip install 'qbumpers[minari]'") from error
     if not _VERSIONED.search(dataset):
         raise RequestError(
             f"dataset = {dataset!r}; a name with a version, such as 'cliff/bumpers-v0', is needed"
@@ -60,35 +56,46 @@ def export_recording(
     contents = {named.condition: content for named, content in plan.named}
     if condition not in contents:
         raise unknown_name("condition", condition, contents)
-    which = range(trials) if isinstance(trials, int) else trials
-    if not which or min(which) < 0 or max(which) >= plan.experiment.trials:
-        raise RequestError(
-            f"trials = {trials!r}; at least 1, of those that were run, 0 to "
-            f"{plan.experiment.trials - 1}, are needed"
-        )
-    chosen = plan.conditions[contents[condition]]
-    buffers = [
-        EpisodeBuffer(id=number, **episode)
-        for number, episode in enumerate(
-            episode
-            for trial in which
-            for episode in _episodes(trial, record(chosen, trial=trial, seed=plan.experiment.seed))
-        )
+    chosen, seed = plan.conditions[contents[condition]], plan.experiment.seed
+    episodes = [
+        episode
+        for trial in _checked(trials, plan.experiment.trials)
+        for episode in _episodes(trial, record(chosen, trial=trial, seed=seed))
     ]
+    _write(dataset, condition, chosen.task, episodes)
+    return len(episodes)
+
+
+def _checked(trials: int | range, run: int) -> range:
+    which = range(trials) if isinstance(trials, int) else trials
+    if not which or min(which) < 0 or max(which) >= run:
+        raise RequestError(
+            f"trials = {trials!r}; at least 1, of those that were run, 0 to {run - 1}, are needed"
+        )
+    return which
+
+
+def _write(
+    dataset: str, condition: str, task: TabularTask, episodes: Sequence[Mapping[str, Any]]
+) -> None:
+    try:
+        import minari
+        from minari.data_collector import EpisodeBuffer
+    except ImportError as error:
+        raise RequestError("Minari is not installed: pip install 'qbumpers[minari]'") from error
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # it asks for an author and a link
         try:
             minari.create_dataset_from_buffers(
                 dataset,
-                buffers,
-                observation_space=gymnasium.spaces.Discrete(chosen.task.states),
-                action_space=gymnasium.spaces.Discrete(chosen.task.actions),
+                [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
+                observation_space=gymnasium.spaces.Discrete(task.states),
+                action_space=gymnasium.spaces.Discrete(task.actions),
                 algorithm_name=condition,
-                description=f"Simulated people at {chosen.task.name}, assisted by {condition}.",
+                description=f"Simulated people at {task.name}, assisted by {condition}.",
             )
         except ValueError as error:
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
-    return len(buffers)
 
 
 def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:

@@ -124,7 +124,8 @@ def load_values(path: str | Path) -> TabularValues:
     except FileNotFoundError as error:
         raise RequestError(f"values file {path}: there is none") from error
     except OSError as error:
-        raise RequestError(f"values file {path}: {error.strerror or error}") from error
+        reason = error.strerror or error
+        raise RequestError(f"values file {path}: not a file of Q values ({reason})") from error
     return decoded_values(content, str(path))
 
 
