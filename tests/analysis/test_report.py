@@ -25,7 +25,7 @@ SECTIONS = [
     "overrides", "dependence", "distribution", "heatmaps", "thresholds", "conditions", "measures",
     "again",
 ]  # fmt: skip
-TABLES = ["summary", "published", "regret", "methods", "differences"]
+TABLES = ["summary", "published", "regret", "methods", "advantages", "differences"]
 
 
 @pytest.fixture(scope="module")
@@ -143,8 +143,25 @@ def test_every_printed_number_stands_beside_the_measured_one(found):
             assert row["measured_mean"] == by_condition[condition][f"{measure}_mean"]
 
 
+def test_methods_are_compared_two_by_two_by_what_they_cover(found):
+    methods = pl.read_csv(found.folder / "methods.csv").rows_by_key("assistant", named=True)
+    advantages = pl.read_csv(found.folder / "advantages.csv").rows(named=True)
+    pairs = {frozenset((row["assistant"], row["other"])) for row in advantages}
+    assert len(pairs) == len(advantages) == len(methods) * (len(methods) - 1) / 2
+    for cells, row in zip(found.page.rows("methods", 1), advantages, strict=True):
+        ours, theirs = (methods[row[who]][0]["hypervolume_mean"] for who in ("assistant", "other"))
+        assert row["advantage_mean"] == pytest.approx(ours - theirs)
+        assert row["advantage_low"] <= row["advantage_mean"] <= row["advantage_high"]
+        assert cells == [
+            readable(row["assistant"]),
+            readable(row["other"]),
+            interval(row, "advantage", 0),
+            f"{100 * row['probability']:.0f}%",
+        ]
+
+
 def test_regret_is_told_with_its_interval(found):
-    rows = found.page.rows("methods", 1)
+    rows = found.page.rows("methods", 2)
     assert [row["matched"] for row in found.regret] == ["performance", "learning"]
     for cells, row in zip(rows, found.regret, strict=True):
         assert [cells[0], *cells[2:]] == [

@@ -81,7 +81,7 @@ def test_two_swept_methods_of_ones_own_have_regret_but_no_published_numbers(tmp_
     page = reported(tmp_path, assistants=methods, episodes=20)
     more = {"sensitivity", "overrides", "heatmaps", "thresholds"}
     assert set(page.sections) == {*ANYWHERE, *more}
-    assert [cells[0] for cells in page.rows("methods", 1)] == ["performance", "learning"]
+    assert [cells[0] for cells in page.rows("methods", 2)] == ["performance", "learning"]
     assert "The thresholding cluster is one assistant" not in page.text  # it takes second-best
 
 
@@ -101,7 +101,7 @@ def test_a_report_needs_its_own_files_alone_and_comes_out_the_same(plain, tmp_pa
     parts = []
     findings = write_report(folder, advance=parts.append)
     expected = contents_of(plain, "*.csv", "*.html", "figures/*")
-    assert len(expected) == 4 + 3 * 6
+    assert len(expected) == 5 + 3 * 6
     assert contents_of(folder, "*.csv", "*.html", "figures/*") == expected
     assert parts[0] == "tables"
     assert parts[-1] == "report.html"

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 
 from qbumpers.assistants import register_assistant
 from qbumpers.errors import RequestError
-from qbumpers.experiments import addresses, cells, cluster
+from qbumpers.experiments import cells, cluster
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.cluster import BATCH_SECONDS, LOCAL, RayCluster, batches, versions
 from qbumpers.experiments.plan import make_plan
@@ -348,50 +347,6 @@ def test_a_stopped_run_ends_at_once_with_all_its_processes_and_can_go_on(tmp_pat
     assert finished
     process.stdout.close()
     process.stderr.close()
-
-
-@pytest.mark.parametrize(
-    "address", ["", "cluster", "cluster:", ":6379", "a:0", "a:70000", "a:b", "a:1/c", "u@a:1"]
-)
-def test_what_is_no_address_is_refused(address):
-    with pytest.raises(RequestError, match=r"; 'local', or HOST:PORT of the head node of a Ray"):
-        RayCluster(address).__enter__()
-
-
-def test_ray_client_addresses_are_refused_with_another_way():
-    with pytest.raises(RequestError, match=r"'ray://127\.0\.0\.1:10001': Ray Client is not supp"):
-        RayCluster("ray://127.0.0.1:10001").__enter__()
-
-
-def test_an_address_where_nothing_listens_fails_at_once():
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-    begun = time.monotonic()
-    message = rf"on = '127\.0\.0\.1:{port}': cannot use Ray there \(nothing answers there\); 'local"
-    with pytest.raises(RequestError, match=message):
-        RayCluster(f"127.0.0.1:{port}").__enter__()
-    assert time.monotonic() - begun < 5
-
-
-def test_an_address_where_something_else_listens_fails_in_time(monkeypatch):
-    monkeypatch.setattr(addresses, "_CONNECTING", 5.0)
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        with pytest.raises(RequestError, match=r"what answers there is no head node of Ray\)"):
-            RayCluster(f"127.0.0.1:{port}").__enter__()
-
-
-@pytest.mark.parametrize(
-    ("said", "reason"),
-    [
-        (None, ""),
-        (b"Traceback\n  x\nRuntimeError: Version mismatch: 2.1\nmore\n", "Version mismatch: 2.1"),
-        (b"[W] InvalidAuthToken: missing\nConnectionError: failed", "it asks for a token"),
-    ],
-)
-def test_what_ray_says_is_wrong_is_passed_on(said, reason):
-    assert addresses._reason(said).startswith(reason)
-    assert bool(addresses._reason(said)) == bool(reason)
 
 
 def test_a_missing_ray_is_said_with_how_to_install_it(monkeypatch):

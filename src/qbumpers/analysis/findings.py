@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from qbumpers.analysis.comparisons import RETURNS, against, methods, optimal, pooled
+from qbumpers.analysis.comparisons import RETURNS, advantages, against, methods, optimal, pooled
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import summary, trial_measures, trial_samples
 from qbumpers.analysis.published import Comparison, compare, published_numbers
@@ -24,6 +24,7 @@ class LearnerFindings(NamedTuple):
         frontier: a row a condition: its mean returns with intervals, whether it is Pareto-optimal
             (`pareto`) and the probability of it.
         methods: a row a method: `methods.csv`.
+        advantages: a row a pair of methods: `advantages.csv`.
         control: the condition without assistance; None where there is none to compare with.
         differences: a row a measure and condition, against the control: `differences.csv`; no rows
             without a control.
@@ -36,6 +37,7 @@ class LearnerFindings(NamedTuple):
     trials: pl.DataFrame
     frontier: pl.DataFrame
     methods: pl.DataFrame
+    advantages: pl.DataFrame
     control: str | None
     differences: pl.DataFrame
     compared: tuple[str, str] | None
@@ -122,6 +124,7 @@ def _about(
             best.select("condition", "pareto", "probability"), on="condition", maintain_order="left"
         ),
         methods=areas,
+        advantages=advantages(trials, generator(6), paired),
         control=control,
         differences=_differences(trials, control, paired),
         compared=compared,

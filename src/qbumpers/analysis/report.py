@@ -21,8 +21,9 @@ from qbumpers.files import write_atomically
 REPORT, SUMMARY, TRIALS = "report.html", "summary.csv", "trials.parquet"
 """The page; a row a condition; a row a trial."""
 
-METHODS, DIFFERENCES, REGRET, PUBLISHED = (
+METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED = (
     "methods.csv",
+    "advantages.csv",
     "differences.csv",
     "regret.csv",
     "published.csv",
@@ -30,7 +31,7 @@ METHODS, DIFFERENCES, REGRET, PUBLISHED = (
 """Written where there is something to compare."""
 
 FIGURES = "figures"
-_OPTIONAL = (METHODS, DIFFERENCES, REGRET, PUBLISHED)
+_OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED)
 _FIGURE_FILES = {".png", ".svg", ".csv"}
 
 
@@ -84,6 +85,7 @@ def _tables(findings: Findings) -> dict[str, pl.DataFrame]:
     tables = {
         SUMMARY: findings.summary,
         METHODS: pl.concat([_marked(about, about.methods) for about in everyone]),
+        ADVANTAGES: pl.concat([_marked(about, about.advantages) for about in everyone]),
         DIFFERENCES: pl.concat([_marked(about, about.differences) for about in everyone]),
         REGRET: pl.DataFrame(
             [_flat(about, m, r) for about in everyone for m, r in about.regrets.items()]

@@ -7,6 +7,7 @@ import io
 import platform
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,6 +45,8 @@ _FILE = re.compile(
 
 # An experiment may be continued with more or fewer of the first three, and be read in another way.
 _CHANGING = {"trials", "assistants", "learners", "criterion", "reproduces"}
+
+_COMPRESSION = 1  # of zstd: on these tables the fastest level is also the smallest
 
 _LIBRARIES = ("numpy", "numba", "scipy", "polars")
 
@@ -138,17 +141,19 @@ class Store:
         Raises:
             StoreError: where a cell cannot be read, or a table cannot be written.
         """
-        parts = list(parts)
+        cells = [(named, cell) for named, chosen in parts for cell in chosen]
         for kind in TABLES:
-            table = pl.concat(
-                self.read(cell, kind).select(*_labels(named, kind), pl.all())
-                for named, cells in parts
-                for cell in cells
-            )
+            with ThreadPoolExecutor() as pool:
+                table = pl.concat(
+                    pool.map(lambda part, kind=kind: self._labelled(part[0], part[1], kind), cells)
+                )
             if kind == STATES:
                 keys = ["condition", "state", "row", "column"]
                 table = table.group_by(keys, maintain_order=True).sum()
             self._folder.write(kind, encoded(table))
+
+    def _labelled(self, named: NamedCondition, cell: Cell, kind: str) -> pl.DataFrame:
+        return self.read(cell, kind).select(*_labels(named, kind), pl.all())
 
     def read(self, cell: Cell, kind: str) -> pl.DataFrame:
         """A table of a cell that was written or surveyed; StoreError where it is damaged."""
@@ -162,7 +167,7 @@ class Store:
 def encoded(table: pl.DataFrame) -> bytes:
     """A table as the bytes of a Parquet file."""
     buffer = io.BytesIO()
-    table.write_parquet(buffer)
+    table.write_parquet(buffer, compression_level=_COMPRESSION)
     return buffer.getvalue()
 
 

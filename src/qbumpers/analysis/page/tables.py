@@ -67,6 +67,25 @@ def methods_table(about: LearnerFindings) -> Table:
     return Table(columns, rows, "methods.csv", cards=True)
 
 
+def advantage_table(about: LearnerFindings) -> Table:
+    """Every two methods against each other."""
+    columns = [
+        Column("method", text=True),
+        Column("against", text=True),
+        Column("covers more by"),
+        Column("share of resamples in which it covers more"),
+    ]
+    rows = [
+        [
+            *(NAMES.get(row[who], row[who]) for who in ("assistant", "other")),
+            _of(row, "advantage", 0),
+            per_cent(row["probability"]),
+        ]
+        for row in about.advantages.iter_rows(named=True)
+    ]
+    return Table(columns, rows, "advantages.csv", cards=True)
+
+
 def regret_table(about: LearnerFindings) -> Table:
     """The method against the baseline."""
     columns = [
