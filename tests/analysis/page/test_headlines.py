@@ -48,6 +48,7 @@ def about(learner="q-learning", regrets=(), trials=30):
         trials=pl.DataFrame(),
         frontier=pl.DataFrame(),
         methods=METHODS,
+        advantages=pl.DataFrame(),
         control="none",
         differences=DIFFERENCES,
         compared=("stochastic-q-bumpers", "local-q-thresholding"),
