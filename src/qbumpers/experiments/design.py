@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.errors import RequestError, unknown_name
-from qbumpers.experiments.cells import MANY_CELLS
+from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
 from qbumpers.learners import PERCEPTIONS, QLearner, Schedule
 
 Value = bool | int | float | str
@@ -169,6 +169,10 @@ class Experiment(_Model):
             raise unknown_name("reproduces", self.reproduces, reproductions())
         return self
 
+    def trials_a_cell(self) -> int:
+        """How many trials a whole cell has."""
+        return trials_a_cell(self.episodes + self.retention)
+
     def condition_count(self) -> int:
         """How many conditions there are, counted without making them."""
         options = [assistant.model_extra or {} for assistant in self.assistants]
@@ -181,16 +185,14 @@ class Experiment(_Model):
             RequestError: where an assistant or option is wrong, or a condition occurs twice.
         """
         assistants = [a for design in self.assistants for a in design.assistants()]
-        everyone = [
-            NamedCondition(
-                condition_id(assistant, assistants) + _apart(learner, self.learners, "@"),
-                assistant,
-                learner,
-                learner.name + _apart(learner, self.learners, "/"),
-            )
-            for learner in self.learners
-            for assistant in assistants
-        ]
+        names = [condition_id(assistant, assistants) for assistant in assistants]
+        everyone = []
+        for learner in self.learners:
+            apart, learner_id = (_apart(learner, self.learners, mark) for mark in "@/")
+            everyone += [
+                NamedCondition(name + apart, assistant, learner, learner.name + learner_id)
+                for name, assistant in zip(names, assistants, strict=True)
+            ]
         for name, times in Counter(named.condition for named in everyone).items():
             if times > 1:
                 raise RequestError(f"condition {name} occurs {times} times; keep one")

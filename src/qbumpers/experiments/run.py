@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from qbumpers.experiments.cells import Cell, tiles, trials_a_cell
+from qbumpers.experiments.cells import Cell, tiles
 from qbumpers.experiments.local import Threads
 from qbumpers.experiments.plan import Plan, estimated_seconds
 from qbumpers.experiments.store import open_store
@@ -65,12 +65,11 @@ def run_experiment(
     """
     executor = executor or Threads()
     design = plan.experiment
-    size = trials_a_cell(design.episodes + design.retention)
     with open_store(folder, design) as store:
         store.write_values(plan.values)
         found = store.survey(plan.conditions)
         cells = {
-            content: tiles(content, design.trials, size, found.cells[content])
+            content: tiles(content, design.trials, design.trials_a_cell(), found.cells[content])
             for content in plan.conditions
         }
         missing = [

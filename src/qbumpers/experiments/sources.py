@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from qbumpers.errors import RequestError, from_validation, unknown_name
-from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
+from qbumpers.experiments.cells import MANY_CELLS
 from qbumpers.experiments.design import (
     Experiment,
     LearnerDesign,
@@ -39,9 +39,7 @@ def make_experiment(
         experiment = Experiment.model_validate(settings)
     except ValidationError as error:
         raise from_validation(error, where, _field_names()) from error
-    cells = experiment.condition_count() * math.ceil(
-        experiment.trials / trials_a_cell(experiment.episodes + experiment.retention)
-    )
+    cells = experiment.condition_count() * math.ceil(experiment.trials / experiment.trials_a_cell())
     if cells > MANY_CELLS and not large:
         raise RequestError(
             f"{where}: {experiment.condition_count():,} conditions, together {cells:,} cells of "

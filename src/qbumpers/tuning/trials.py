@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from qbumpers.experiments.cells import Cell, trials_a_cell
+from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan, estimated_seconds
 from qbumpers.experiments.run import Executor
 from qbumpers.experiments.store import EPISODES, Store
@@ -84,8 +84,7 @@ class Trials:
 
     def _look(self, wanted: list[Cell]) -> None:
         """Have trials read, and run first where they are missing."""
-        experiment = self._plan.experiment
-        size = trials_a_cell(experiment.episodes + experiment.retention)
+        size = self._plan.experiment.trials_a_cell()
         missing = [cell for span in wanted for cell in gaps(span, self._cells[span.content], size)]
         rates = {cell.content: seconds for cell, seconds in self._seconds.items()}
         seconds = {cell: rates[cell.content] * cell.trials for cell in missing}
