@@ -4,6 +4,7 @@ import os
 import platform
 
 import cluster
+import lander
 import shared_control
 import simulation
 import sweeps
@@ -16,7 +17,7 @@ def main() -> None:
     load = os.getloadavg()[0]
     rows = [
         row
-        for benchmark in (simulation, shared_control, sweeps, cluster, whole_processes)
+        for benchmark in (simulation, shared_control, lander, sweeps, cluster, whole_processes)
         for row in benchmark.measure(quick)
     ]
     machine = f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} when begun"

@@ -16,3 +16,8 @@ gymnasium.register(
     entry_point="qbumpers.tasks.cliff_walking:CliffWalking",
     max_episode_steps=100,
 )
+gymnasium.register(
+    id="qbumpers/LunarLander-v0",
+    entry_point="qbumpers.tasks.lunar_lander:LunarLander",
+    max_episode_steps=1000,
+)

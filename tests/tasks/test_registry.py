@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from qbumpers import RequestError
-from qbumpers.tasks import cliff_walking, make_task, register_task, task_names
+from qbumpers.tasks import VectorTask, cliff_walking, make_task, register_task, task_names
 from tests.tasks.examples import random_task
 
 
@@ -54,9 +54,25 @@ def test_a_wrong_argument_of_an_environment_is_named():
         make_task("FrozenLake-v1", discount=0.9, map_name="5x5")
 
 
-def test_an_environment_without_a_table_is_refused():
-    with pytest.raises(RequestError, match="CartPole-v1 has no attribute P"):
-        make_task("CartPole-v1", discount=0.9)
+def test_an_environment_with_vectors_makes_a_task_of_its_own_kind():
+    task = make_task("CartPole-v1", discount=0.9, episode_limit=70, sutton_barto_reward=True)
+    assert isinstance(task, VectorTask)
+    assert (task.discount, task.episode_limit) == (0.9, 70)
+    assert task.make_stepper().step
+
+
+def test_an_environment_of_neither_kind_is_refused():
+    with pytest.raises(RequestError, match="'Pendulum-v1': its action space is Box"):
+        make_task("Pendulum-v1", discount=0.9)
+    with pytest.raises(RequestError, match="'Blackjack-v1': its observation space is Tuple"):
+        make_task("Blackjack-v1", discount=0.9)
+
+
+def test_a_registered_task_may_take_arguments():
+    register_task("a-task-with-arguments", lambda states: random_task(0, states, 2))
+    assert make_task("a-task-with-arguments", states=4).states == 4
+    with pytest.raises(RequestError, match=r"'states'; its arguments are: states"):
+        make_task("a-task-with-arguments")
 
 
 def test_an_environment_without_a_limit_needs_one():

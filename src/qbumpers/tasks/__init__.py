@@ -1,14 +1,18 @@
-"""Tasks: tabular ones with known transitions, and the package's Gymnasium environments."""
+"""Tasks: tabular ones, those observed as vectors, and the package's Gymnasium environments."""
 
 from qbumpers.tasks.cliff_walking import CliffWalking, cliff_walking
 from qbumpers.tasks.environment import TabularEnvironment
-from qbumpers.tasks.registry import make_task, register_task, task_names
+from qbumpers.tasks.registry import Task, make_task, register_task, task_names
 from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.vector import Stepper, VectorTask
 
 __all__ = [
     "CliffWalking",
+    "Stepper",
     "TabularEnvironment",
     "TabularTask",
+    "Task",
+    "VectorTask",
     "cliff_walking",
     "make_task",
     "register_task",

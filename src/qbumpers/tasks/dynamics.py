@@ -7,8 +7,8 @@ from numba.extending import register_jitable
 
 from qbumpers.compilation import INLINE
 
-TERMINATED, SUCCESS, CRASH = 1, 2, 4
-"""Bits of `Dynamics.events`."""
+TERMINATED, SUCCESS, CRASH, TRUNCATED = 1, 2, 4, 8
+"""Bits of the events of a step; TRUNCATED where an environment stops by itself, not at its end."""
 
 
 class Dynamics(NamedTuple):
