@@ -1,8 +1,9 @@
 """Simulated people, many and fast."""
 
 from qbumpers.simulation.condition import Condition, make_condition
-from qbumpers.simulation.loops import Outcomes, Script, StateCounts, Steps
-from qbumpers.simulation.tabular import Simulation, record, run, simulate
+from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
+from qbumpers.simulation.trials import record, run, simulate
+from qbumpers.simulation.workers import make_pool
 
 __all__ = [
     "Condition",
@@ -12,6 +13,7 @@ __all__ = [
     "StateCounts",
     "Steps",
     "make_condition",
+    "make_pool",
     "record",
     "run",
     "simulate",

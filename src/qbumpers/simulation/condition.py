@@ -7,10 +7,12 @@ import numpy as np
 
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.errors import RequestError, checked
-from qbumpers.learners import QLearner
+from qbumpers.learners import DoubleDQN, QLearner
 from qbumpers.learners import perception as named_perception
-from qbumpers.tasks import TabularTask
-from qbumpers.values import QValues, check_width, solve
+from qbumpers.random_streams import episode_streams, trial_streams
+from qbumpers.simulation.outcomes import Outcomes
+from qbumpers.tasks import TabularTask, Task
+from qbumpers.values import NetworkValues, QValues, check_width, solve
 
 
 class Condition(NamedTuple):
@@ -18,7 +20,7 @@ class Condition(NamedTuple):
 
     Attributes:
         task: the task.
-        values: float64 [S, A], Q* of the assistant.
+        values: Q* of the assistant; float64 [S, A] of a tabular task, else a network.
         discount: of those values.
         assistant: the assistant.
         learner: the simulated person.
@@ -28,11 +30,11 @@ class Condition(NamedTuple):
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
     """
 
-    task: TabularTask
-    values: np.ndarray
+    task: Task
+    values: Any
     discount: float
     assistant: Assistant
-    learner: QLearner
+    learner: QLearner | DoubleDQN
     perception: str
     episodes: int
     retention: int = 0
@@ -50,26 +52,35 @@ class Condition(NamedTuple):
         """What decides the assisted episodes, as JSON-like data: it seeds the random streams."""
         return {
             "task": self.task.digest(),
-            "values": hashlib.sha256(self.values.tobytes()).hexdigest(),
+            "values": _digest(self.values),
             "discount": self.discount,
             "assistant": self.assistant.name,
             "options": self.assistant.options._asdict(),
-            "learner": {
-                **self.learner._asdict(),
-                "epsilon": self.learner.epsilon._asdict(),
-                "learning_rate": self.learner.learning_rate._asdict(),
-            },
+            "learner": _plain(self.learner),
             "perception": self.perception,
             "episodes": self.episodes,
         }
 
 
+def _digest(values: Any) -> str:
+    if isinstance(values, NetworkValues):
+        return values.digest()
+    return hashlib.sha256(values.tobytes()).hexdigest()
+
+
+def _plain(settings: Any) -> Any:
+    """NamedTuples within NamedTuples as dictionaries."""
+    if hasattr(settings, "_asdict"):
+        return {field: _plain(value) for field, value in settings._asdict().items()}
+    return settings
+
+
 def make_condition(
-    task: TabularTask,
+    task: Task,
     assistant: Assistant | str,
     *,
     values: QValues | None = None,
-    learner: QLearner | None = None,
+    learner: QLearner | DoubleDQN | None = None,
     perception: str = "transition",
     episodes: int = 100,
     retention: int = 0,
@@ -80,9 +91,10 @@ def make_condition(
     Args:
         task: the task.
         assistant: an assistant, or the name of one that needs no options.
-        values: Q* of the assistant; the exact solution where None. Values that state no discount
-            are taken to have the task's.
-        learner: the simulated person; where None, the paper's, with the task's discount.
+        values: Q* of the assistant; where None, the exact solution of a tabular task. Values that
+            state no discount are taken to have the task's.
+        learner: the simulated person; where None, the paper's, with the task's discount: a
+            `QLearner` at a tabular task, else a `DoubleDQN`.
         perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
         episodes: of a trial, at least 1.
         retention: further episodes without the assistant, not negative.
@@ -102,21 +114,13 @@ def make_condition(
     if isinstance(assistant, str):
         assistant = make_assistant(assistant)
     named_perception(perception)
-    source = solve(task) if values is None else values
-    table = np.stack(
-        [
-            check_width(source(state), task.actions, f"in state {state}")
-            for state in range(task.states)
-        ]
-    )
-    for state in np.flatnonzero(task.start):
-        assistant.check_start(float(table[state].max()))
+    kept, discount = _checked_values(task, assistant, values)
     return Condition(
         task=task,
-        values=table,
-        discount=float(getattr(source, "discount", task.discount)),
+        values=kept,
+        discount=discount,
         assistant=assistant,
-        learner=_checked_learner(learner or QLearner(discount=task.discount)),
+        learner=_checked_learner(task, learner),
         perception=perception,
         episodes=episodes,
         retention=retention,
@@ -124,6 +128,54 @@ def make_condition(
     )
 
 
-def _checked_learner(learner: QLearner) -> QLearner:
-    schedules = {name: getattr(learner, name)._asdict() for name in ("epsilon", "learning_rate")}
-    return checked(QLearner, {**learner._asdict(), **schedules}, "learner")
+def _checked_values(task: Task, assistant: Assistant, values: QValues | None) -> tuple[Any, float]:
+    """Q* as a condition keeps it, and its discount."""
+    if isinstance(task, TabularTask):
+        source = solve(task) if values is None else values
+        table = np.stack(
+            [
+                check_width(source(state), task.actions, f"in state {state}")
+                for state in range(task.states)
+            ]
+        )
+        for state in np.flatnonzero(task.start):
+            assistant.check_start(float(table[state].max()))
+        return table, float(getattr(source, "discount", task.discount))
+    if not isinstance(values, NetworkValues):
+        raise RequestError(
+            f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
+            "values, for instance of load_values or train_expert"
+        )
+    found = (values.inputs, values.actions)
+    if found != (task.observation_size, task.actions):
+        raise RequestError(
+            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
+            f"{task.name} needs {task.observation_size} and {task.actions}"
+        )
+    return values, values.discount
+
+
+def _checked_learner(task: Task, learner: QLearner | DoubleDQN | None) -> QLearner | DoubleDQN:
+    kind = QLearner if isinstance(task, TabularTask) else DoubleDQN
+    learner = kind(discount=task.discount) if learner is None else learner
+    if not isinstance(learner, kind):
+        raise RequestError(
+            f"learner = {learner!r}; at task {task.name} people learn by a {kind.__name__}"
+        )
+    return checked(kind, _plain(learner), "learner")
+
+
+def outcome_room(condition: Condition, trials: int) -> Outcomes:
+    """Room for the outcomes of so many trials."""
+    kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
+    shape = (trials, condition.episodes + condition.retention)
+    return Outcomes(*(np.zeros(shape, kind) for kind in kinds))
+
+
+def streams(condition: Condition, trials: range, seed: int) -> np.ndarray:
+    """Random streams of trials: uint64 [T, 1, 4, 4]; [T, E, 4, 4] to begin anew each episode."""
+    if condition.common_random_numbers:
+        # Each episode begins anew: episodes of other length before it change nothing.
+        episodes = condition.episodes + condition.retention
+        return episode_streams(seed, {"common_random_numbers": True}, trials, episodes)
+    return trial_streams(seed, condition.learning(), trials)[:, None]

@@ -1,0 +1,151 @@
+"""Simulated people at any task: `simulate`, and its parts for prepared conditions."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+
+from qbumpers.assistants import Assistant
+from qbumpers.errors import RequestError
+from qbumpers.learners import DoubleDQN, QLearner
+from qbumpers.simulation import deep, tabular
+from qbumpers.simulation.condition import Condition, make_condition
+from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
+from qbumpers.simulation.workers import make_pool
+from qbumpers.tasks import TabularTask, Task
+from qbumpers.values import QValues
+
+
+def simulate(
+    task: Task,
+    assistant: Assistant | str,
+    *,
+    values: QValues | None = None,
+    learner: QLearner | DoubleDQN | None = None,
+    perception: str = "transition",
+    episodes: int = 100,
+    retention: int = 0,
+    common_random_numbers: bool = False,
+    trials: int | range = 100,
+    seed: int = 0,
+    workers: int = 1,
+) -> Simulation:
+    """Simulate people who learn a task with an assistant's help (Section 4.2).
+
+    A trial is one person: `episodes` times an assisted episode from which they learn, then a greedy
+    one without help from which they do not. Equal arguments give equal numbers, whatever the
+    number of workers and whichever trials are run together.
+
+    Args:
+        task: the task.
+        assistant: an assistant, or the name of one that needs no options.
+        values: Q* of the assistant; where None, the exact solution of a tabular task.
+        learner: the simulated person; where None, the paper's, with the task's discount.
+        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
+        episodes: of a trial, at least 1.
+        retention: further episodes in which the learner goes on without the assistant, each
+            followed by a greedy one.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+        trials: how many, at least 1; or which.
+        seed: of the experiment, not negative.
+        workers: threads, or processes where observations are vectors; a script that asks for
+            several of those must guard its start with `if __name__ == "__main__"`.
+
+    Returns:
+        Outcomes by trial and episode, and counts by state.
+
+    Raises:
+        RequestError: as `make_condition`, and for a number of trials below 1 or a negative seed.
+    """
+    condition = make_condition(
+        task,
+        assistant,
+        values=values,
+        learner=learner,
+        perception=perception,
+        episodes=episodes,
+        retention=retention,
+        common_random_numbers=common_random_numbers,
+    )
+    return run(condition, trials=trials, seed=seed, workers=workers)
+
+
+def run(
+    condition: Condition, *, trials: int | range, seed: int = 0, workers: int = 1
+) -> Simulation:
+    """Simulate a condition; `simulate` says what the arguments mean."""
+    which = _checked_trials(trials, seed)
+    if workers < 1:
+        raise RequestError(f"workers = {workers!r}; at least 1 is needed")
+    ends = np.linspace(0, len(which), min(workers, len(which)) + 1).astype(int).tolist()
+    ranges = [which[first:last] for first, last in itertools.pairwise(ends)]
+    if len(ranges) == 1:
+        return _run_block(condition, ranges[0], seed)
+    with make_pool(condition.task, workers) as pool:
+        blocks = pool.map(_run_block, *zip(*((condition, r, seed) for r in ranges), strict=True))
+        return _joined(list(blocks))
+
+
+def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
+    return _engine(condition.task).run_block(condition, trials, seed)
+
+
+def _engine(task: Task) -> Any:
+    return tabular if isinstance(task, TabularTask) else deep
+
+
+def _joined(blocks: list[Simulation]) -> Simulation:
+    """Blocks of trials, one after another."""
+    outcomes = Outcomes(*map(np.concatenate, zip(*(b.outcomes for b in blocks), strict=True)))
+    counts = [block.counts for block in blocks if block.counts is not None]
+    if not counts:
+        return Simulation(outcomes, None)
+    sums = map(np.sum, zip(*counts, strict=True), (0, 0, 0))
+    return Simulation(outcomes, StateCounts(*sums))
+
+
+def record(
+    condition: Condition, *, trial: int = 0, seed: int = 0, script: Script | None = None
+) -> Steps:
+    """Every assisted step of one trial.
+
+    Args:
+        condition: what to simulate.
+        trial: which trial.
+        seed: of the experiment.
+        script: proposals and noise to be played again, in place of a learner's and fresh noise;
+            the trial ends with the script.
+
+    Returns:
+        Step records, arrays [N].
+
+    Raises:
+        RequestError: where the trial, the seed or the script is out of range.
+    """
+    if script is not None:
+        _check_script(script, condition.task.actions)
+    trials = _checked_trials(range(trial, trial + 1), seed)
+    return _engine(condition.task).record(condition, trials, seed, script)
+
+
+def _checked_trials(trials: int | range, seed: int) -> range:
+    if not isinstance(seed, int) or seed < 0:
+        raise RequestError(f"seed = {seed!r}; a whole number, not negative, is needed")
+    which = range(trials) if isinstance(trials, int) else trials
+    if not isinstance(which, range) or len(which) < 1 or min(which) < 0:
+        raise RequestError(f"trials = {trials!r}; at least 1, or a range from 0 up, is needed")
+    return which
+
+
+def _check_script(script: Script, actions: int) -> None:
+    lengths = {len(part) for part in script}
+    if len(lengths) != 1:
+        raise RequestError(
+            f"script: its parts have lengths {sorted(lengths)}; one length is needed"
+        )
+    proposed = np.asarray(script.proposed)
+    if len(proposed) and not 0 <= proposed.min() <= proposed.max() < actions:
+        raise RequestError(f"script: proposed actions must lie in [0, {actions})")
+    noise = np.concatenate([script.coin, script.tie])
+    if not ((noise >= 0) & (noise < 1)).all():
+        raise RequestError("script: coin and tie must lie in [0, 1)")
