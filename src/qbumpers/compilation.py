@@ -108,6 +108,24 @@ def compiled_for_session(function: F) -> F:
     return dispatcher
 
 
+def entered(function: Any, *examples: Any) -> Any:
+    """Compiled code for arguments of known types, entered without looking them up at every call.
+
+    The look-up takes microseconds where arguments are tuples. Nothing checks the types any more.
+
+    Args:
+        function: compiled; one that is not is returned as it is.
+        *examples: one for each argument; later arguments must be of the same types, arrays of the
+            same kind and number of dimensions.
+
+    Returns:
+        A function of the same arguments.
+    """
+    if not hasattr(function, "compile"):
+        return function
+    return function.compile(tuple(map(numba.typeof, examples)))
+
+
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """The Python source of a function, to be called where compiled code is no help.
 

@@ -10,7 +10,16 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.compilation import compiled, compiled_apart, compiled_fused
+from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.learners.layers import (
+    activate,
+    add_biases,
+    derive,
+    gradient_of_layer,
+    matrix,
+    pass_down,
+    weighted_sums,
+)
 from qbumpers.random_streams import draw
 
 
@@ -113,81 +122,6 @@ def _spread(weights: np.ndarray, connections: int, stream: np.ndarray) -> None:
         weights[i] = limit * (2 * draw(stream) - 1)
 
 
-@compiled_fused
-def _activate(units: np.ndarray, bias: np.ndarray, relu: bool) -> None:
-    """Add biases to sums [N, units] and apply the activation, in place."""
-    kind = units.dtype.type
-    if relu:
-        for n in range(units.shape[0]):
-            for i in range(units.shape[1]):
-                total = units[n, i] + bias[i]
-                units[n, i] = total if total > kind(0) else kind(0)
-        return
-    # tanh as a rational function, to 1.2e-8 and rounding: it runs in vector registers.
-    limit, one = kind(8.5), kind(1)
-    p0, p1, p2, p3, p4 = (
-        kind(0.999999988209),
-        kind(0.134132367476),
-        kind(0.00353401451464),
-        kind(2.12508293174e-05),
-        kind(1.42689019343e-08),
-    )
-    q1, q2, q3, q4 = (
-        kind(0.467465594881),
-        kind(0.0260227050596),
-        kind(0.000334884413341),
-        kind(8.1449963106e-07),
-    )
-    for n in range(units.shape[0]):
-        for i in range(units.shape[1]):
-            x = units[n, i] + bias[i]
-            x = limit if x > limit else x
-            x = -limit if x < -limit else x
-            z = x * x
-            above = x * (p0 + z * (p1 + z * (p2 + z * (p3 + z * p4))))
-            y = above / (one + z * (q1 + z * (q2 + z * (q3 + z * q4))))
-            y = one if y > one else y
-            units[n, i] = -one if y < -one else y
-
-
-@compiled_fused
-def _derive(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
-    """Multiply deltas [N, units] by the derivative of the activation at its results `units`."""
-    kind = units.dtype.type
-    for n in range(units.shape[0]):
-        for i in range(units.shape[1]):
-            y = units[n, i]
-            if relu:
-                deltas[n, i] = deltas[n, i] if y > kind(0) else kind(0)
-            else:
-                deltas[n, i] *= kind(1) - y * y
-
-
-@compiled
-def _matrix(numbers: np.ndarray, first: int, rows: int, columns: int) -> np.ndarray:
-    return numbers[first : first + rows * columns].reshape(rows, columns)
-
-
-@compiled_apart
-def _sums(parameters: np.ndarray, place: int, below: np.ndarray, above: np.ndarray) -> np.ndarray:
-    """Weights times the units below, into `above` [N, outputs]; returns the biases, to be added."""
-    inputs, outputs = below.shape[1], above.shape[1]
-    end = place + outputs * inputs
-    weights = _matrix(parameters, place, inputs, outputs)
-    if below.shape[0] == 1:
-        np.dot(below[0], weights, above[0])
-    else:
-        np.dot(below, weights, above)
-    return parameters[end : end + outputs]
-
-
-@compiled
-def _add(sums: np.ndarray, bias: np.ndarray) -> None:
-    for n in range(sums.shape[0]):
-        for i in range(sums.shape[1]):
-            sums[n, i] += bias[i]
-
-
 @compiled_apart
 def forward(layout: Layout, parameters: np.ndarray, room: np.ndarray, states: int) -> np.ndarray:
     """Action values of a batch of states.
@@ -204,26 +138,26 @@ def forward(layout: Layout, parameters: np.ndarray, room: np.ndarray, states: in
     """
     sizes, actions, streams, relu = layout
     place, first = 0, 0
-    below = _matrix(room, 0, states, sizes[0])
+    below = matrix(room, 0, states, sizes[0])
     for layer in range(1, len(sizes)):
         first += below.size
-        units = _matrix(room, first, states, sizes[layer])
-        _activate(units, _sums(parameters, place, below, units), relu)
+        units = matrix(room, first, states, sizes[layer])
+        activate(units, weighted_sums(parameters, place, below, units), relu)
         place += units.shape[1] * (below.shape[1] + 1)
         below = units
     first += below.size
     if streams == 0:
-        values = _matrix(room, first, states, actions)
-        _add(values, _sums(parameters, place, below, values))
+        values = matrix(room, first, states, actions)
+        add_biases(values, weighted_sums(parameters, place, below, values))
         return values
     value_units, value, advantage_units, values = _heads(room, first, states, streams, actions)
-    _activate(value_units, _sums(parameters, place, below, value_units), relu)
+    activate(value_units, weighted_sums(parameters, place, below, value_units), relu)
     place += streams * (below.shape[1] + 1)
-    _add(value, _sums(parameters, place, value_units, value))
+    add_biases(value, weighted_sums(parameters, place, value_units, value))
     place += streams + 1
-    _activate(advantage_units, _sums(parameters, place, below, advantage_units), relu)
+    activate(advantage_units, weighted_sums(parameters, place, below, advantage_units), relu)
     place += streams * (below.shape[1] + 1)
-    _add(values, _sums(parameters, place, advantage_units, values))
+    add_biases(values, weighted_sums(parameters, place, advantage_units, values))
     for n in range(states):
         mean = values[n].sum() / values.dtype.type(actions)
         for action in range(actions):
@@ -255,35 +189,11 @@ def _heads(room: np.ndarray, first: int, states: int, streams: int, actions: int
     third = second + states
     fourth = third + states * streams
     return (
-        _matrix(room, first, states, streams),
-        _matrix(room, second, states, 1),
-        _matrix(room, third, states, streams),
-        _matrix(room, fourth, states, actions),
+        matrix(room, first, states, streams),
+        matrix(room, second, states, 1),
+        matrix(room, third, states, streams),
+        matrix(room, fourth, states, actions),
     )
-
-
-@compiled_apart
-def _gradient_of_layer(
-    gradient: np.ndarray, place: int, below: np.ndarray, deltas: np.ndarray
-) -> None:
-    """Write the gradient of a layer from the units below it and the deltas above it."""
-    inputs, outputs = below.shape[1], deltas.shape[1]
-    end = place + outputs * inputs
-    np.dot(below.T, deltas, _matrix(gradient, place, inputs, outputs))
-    gradient[end : end + outputs] = 0
-    for n in range(deltas.shape[0]):
-        for i in range(outputs):
-            gradient[end + i] += deltas[n, i]
-
-
-@compiled_apart
-def _pass_down(
-    parameters: np.ndarray, place: int, deltas: np.ndarray, units: np.ndarray, relu: bool,
-    below: np.ndarray,
-) -> None:  # fmt: skip
-    """Deltas of the layer below, into `below` [N, inputs], whose results were `units`."""
-    np.dot(deltas, _matrix(parameters, place, units.shape[1], deltas.shape[1]).T, below)
-    _derive(below, units, relu)
 
 
 @compiled_apart
@@ -308,12 +218,12 @@ def backward(
         first += states * sizes[layer - 1]
         place += sizes[layer] * (sizes[layer - 1] + 1)
     last = sizes[len(sizes) - 1]
-    units = _matrix(room, first, states, last)
-    below = _matrix(spare, first, states, last)
+    units = matrix(room, first, states, last)
+    below = matrix(spare, first, states, last)
     if streams == 0:
-        _gradient_of_layer(gradient, place, units, deltas)
+        gradient_of_layer(gradient, place, units, deltas)
         if len(sizes) > 1:
-            _pass_down(parameters, place, deltas, units, relu, below)
+            pass_down(parameters, place, deltas, units, relu, below)
     else:
         _backward_heads(
             layout, parameters, room, deltas, spare, gradient, place, first, units, below
@@ -322,11 +232,11 @@ def backward(
         place -= sizes[layer] * (sizes[layer - 1] + 1)
         above = below
         first -= states * sizes[layer - 1]
-        units = _matrix(room, first, states, sizes[layer - 1])
-        _gradient_of_layer(gradient, place, units, above)
+        units = matrix(room, first, states, sizes[layer - 1])
+        gradient_of_layer(gradient, place, units, above)
         if layer > 1:
-            below = _matrix(spare, first, states, sizes[layer - 1])
-            _pass_down(parameters, place, above, units, relu, below)
+            below = matrix(spare, first, states, sizes[layer - 1])
+            pass_down(parameters, place, above, units, relu, below)
 
 
 @compiled_apart
@@ -347,16 +257,16 @@ def _backward_heads(
     value_place = place + streams * (last + 1)
     advantage_place = value_place + streams + 1
     advantages_place = advantage_place + streams * (last + 1)
-    _gradient_of_layer(gradient, value_place, value_units, value)
-    _pass_down(parameters, value_place, value, value_units, relu, value_down)
-    _gradient_of_layer(gradient, place, units, value_down)
-    _gradient_of_layer(gradient, advantages_place, advantage_units, advantages)
-    _pass_down(parameters, advantages_place, advantages, advantage_units, relu, advantage_down)
-    _gradient_of_layer(gradient, advantage_place, units, advantage_down)
+    gradient_of_layer(gradient, value_place, value_units, value)
+    pass_down(parameters, value_place, value, value_units, relu, value_down)
+    gradient_of_layer(gradient, place, units, value_down)
+    gradient_of_layer(gradient, advantages_place, advantage_units, advantages)
+    pass_down(parameters, advantages_place, advantages, advantage_units, relu, advantage_down)
+    gradient_of_layer(gradient, advantage_place, units, advantage_down)
     if len(sizes) > 1:
-        np.dot(value_down, _matrix(parameters, place, last, streams).T, below)
-        sums = np.dot(advantage_down, _matrix(parameters, advantage_place, last, streams).T)
+        np.dot(value_down, matrix(parameters, place, last, streams).T, below)
+        sums = np.dot(advantage_down, matrix(parameters, advantage_place, last, streams).T)
         for n in range(states):
             for i in range(last):
                 below[n, i] += sums[n, i]
-        _derive(below, units, relu)
+        derive(below, units, relu)

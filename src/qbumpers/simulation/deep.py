@@ -1,21 +1,23 @@
 """Simulated people who see vectors and learn by Double DQN, trial after trial (Section 4.3)."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from qbumpers.assistants.dispatch import start
-from qbumpers.compilation import compiled_for_session, uncompiled
+from qbumpers.compilation import compiled_for_session, entered, uncompiled
 from qbumpers.errors import RequestError
+from qbumpers.learners import DoubleDQN
 from qbumpers.learners import perception as named_perception
 from qbumpers.learners.double_dqn import make_brain, rates
 from qbumpers.learners.q_learning import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw
 from qbumpers.simulation.condition import Condition, outcome_room, streams
-from qbumpers.simulation.deep_steps import START_VALUE, act, prefer, take
+from qbumpers.simulation.deep_steps import START_VALUE, act, finite, prefer, take
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, Steps
+from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED
 
 _ENDED = TERMINATED | TRUNCATED
@@ -52,23 +54,29 @@ def _run_trials(
     script: Script | None,
 ) -> None:
     each = streams(condition, trials, seed)
-    stepper = condition.task.make_stepper()
     with threadpool_limits(1):  # matrices this small are multiplied fastest by one thread
-        for place, trial in enumerate(trials):
-            person = _Trial(condition, stepper, trial, each[place], outcomes, rows, script)
+        for place, number in enumerate(trials):
+            trial = _Trial(condition, number, each[place], rows, script)
             for episode in range(condition.episodes + condition.retention):
-                person.live(place, episode)
+                trial.live(episode, outcomes, place)
+
+
+class _Calls(NamedTuple):
+    """Compiled code for the types of one trial."""
+
+    act: Any
+    take: Any
+    prefer: Any
+    finite: Any
 
 
 class _Trial:
-    """One person's trial; what is passed to compiled code is held as plain tuples.
+    """One person's trial.
 
     Args:
         condition: what is simulated.
-        stepper: the environment.
-        trial: its number, for messages.
+        number: of the trial, for messages.
         each: uint64 [1 or E, 4, 4], streams, of the whole trial or of each episode.
-        outcomes: filled.
         rows: step records are appended; or None.
         script: played again; or None.
     """
@@ -76,128 +84,155 @@ class _Trial:
     def __init__(
         self,
         condition: Condition,
-        stepper: Any,
-        trial: int,
+        number: int,
         each: np.ndarray,
-        outcomes: Outcomes,
         rows: list[tuple[Any, ...]] | None,
         script: Script | None,
     ) -> None:
-        task, learner = condition.task, condition.learner
-        layout = learner.network.layout(task.observation_size, task.actions)
-        values = condition.values
-        self._condition, self._stepper, self._trial = condition, stepper, trial
+        task, person = cast(VectorTask, condition.task), cast(DoubleDQN, condition.learner)
+        self._condition, self._task, self._person = condition, task, person
+        self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
-        self._outcomes, self._rows, self._script = outcomes, rows, script
-        brain = make_brain(learner, layout, self._streams[LEARNER])
+        self._rows, self._script, self._played = rows, script, 0
+        layout = person.network.layout(task.observation_size, task.actions)
+        brain = make_brain(person, layout, self._streams[LEARNER])
         self._brain = tuple(brain)
         self._learner = (tuple(layout), brain.parameters, np.zeros(layout.room(1), np.float32))
+        values = condition.values
         room = np.zeros(values.layout.room(1), np.float32)
         self._expert = (tuple(values.layout), values.parameters, room)
-        self._known = np.zeros(task.actions)
-        self._numbers = tuple(rates(learner))
-        self._penalty = float(learner.penalty)
+        self._known, self._account = np.zeros(task.actions), np.zeros(3)
+        self._numbers, self._penalty = tuple(rates(person)), float(person.penalty)
         self._perception = tuple(named_perception(condition.perception))
         self._options = condition.assistant.options
         self._memory = start(self._options)
-        self._calls = _calls(condition)
-        self._played = 0
+        self._calls = {True: self._entered(True)}
+        if condition.retention:
+            self._calls[False] = self._entered(False)
 
-    def live(self, place: int, episode: int) -> None:
+    def _entered(self, helped: bool) -> _Calls:
+        """The calls of a step, compiled unless the assistant's rule cannot be."""
+        rule = self._condition.assistant.rule
+        calls = (act, take) if rule.built_in else (_act_for_session, _take_for_session)
+        if not rule.compiled:
+            calls = tuple(map(uncompiled, calls))
+        observation = np.zeros(self._task.observation_size, np.float32)
+        return _Calls(
+            entered(
+                calls[0], self._learner, self._expert, observation, self._known, self._streams,
+                0.0, True, self._options, self._memory, self._account,
+                None if self._script is None else (0, 0.0, 0.0),
+            ),
+            entered(
+                calls[1], self._learner, self._brain, self._numbers, self._penalty,
+                self._perception, observation, observation, (0, 0, 0.0, 0.0, 0.0), 0.0, 0,
+                self._streams, self._known, self._options if helped else None, self._memory,
+                self._account, self._condition.discount,
+            ),
+            entered(prefer, self._learner, observation, self._streams[EVALUATION]),
+            entered(finite, 0.0, observation),
+        )  # fmt: skip
+
+    def live(self, episode: int, outcomes: Outcomes, place: int) -> None:
         """An episode of training, then a greedy one without help.
 
         Args:
-            place: of the trial among the outcomes.
             episode: its number.
+            outcomes: filled.
+            place: of the trial among them.
         """
         if episode and len(self._each) > 1:
             self._streams[:] = self._each[episode]
-        self._assisted_episode(place, episode)
-        self._greedy_episode(place, episode)
+        assisted = self._assisted_episode(episode)
+        unassisted = self._greedy_episode(episode)
+        at = (place, episode)
+        outcomes.assisted_return[at], outcomes.assisted_length[at] = assisted[:2]
+        outcomes.assisted_events[at], outcomes.overrides[at] = assisted[2:]
+        outcomes.unassisted_return[at], outcomes.unassisted_length[at] = unassisted[:2]
+        outcomes.unassisted_events[at] = unassisted[2]
 
-    def _assisted_episode(self, place: int, episode: int) -> None:
-        condition, stepper, streams = self._condition, self._stepper, self._streams
-        learner, expert, brain, known = self._learner, self._expert, self._brain, self._known
-        numbers, penalty, perception = self._numbers, self._penalty, self._perception
-        act, take = self._calls
-        options, memory, gamma = self._options, self._memory, condition.discount
+    def _assisted_episode(self, episode: int) -> tuple[float, int, int, int]:
+        """Return, length, events and overrides of an episode of training."""
+        condition, limit = self._condition, self._task.episode_limit
         helped = episode < condition.episodes
-        observing = options if helped else None
-        epsilon = scheduled(condition.learner.epsilon, episode, condition.episodes)
-        account = np.array([0.0, 1.0, math.nan])
-        observation = self._begin(streams[ENVIRONMENT], episode)
+        epsilon = scheduled(self._person.epsilon, episode, condition.episodes)
+        self._account[:] = 0.0, 1.0, math.nan
+        observation = self._begin(self._streams[ENVIRONMENT], episode)
         total, overrides, events, length = 0.0, 0, 0, 0
-        while length < condition.task.episode_limit:
+        while length < limit and not events & _ENDED:
             script = None
             if self._script is not None:
-                if self._played >= len(self._script.proposed):
+                if self._played == len(self._script.proposed):
                     break
                 script = self._scripted()
-            chosen = act(
-                learner, expert, observation, known, streams, epsilon, helped, options, memory,
-                account, script,
-            )  # fmt: skip
-            if length == 0:
-                condition.assistant.check_start(float(account[START_VALUE]))
-            executed = chosen[1]
-            if not 0 <= executed < condition.task.actions:
-                raise RequestError("the assistant's rule chose an action outside the action space")
-            following, reward, event = stepper.step(executed)
-            credited, projected, memory, finite = take(
-                learner, brain, numbers, penalty, perception, observation, following, chosen,
-                reward, event, streams, known, observing, memory, account, gamma,
-            )  # fmt: skip
-            if not finite:
-                raise self._not_finite(episode, length, following, reward)
-            if self._rows is not None:
-                self._rows.append(
-                    (
-                        episode,
-                        observation,
-                        following,
-                        event,
-                        *chosen[:2],
-                        credited,
-                        chosen[0] != executed,
-                        *chosen[2:],
-                        known.copy(),
-                        projected,
-                        reward,
-                    )
-                )
+            observation, reward, event, overridden = self._step(
+                observation, epsilon, helped, script, (episode, length)
+            )
             total += reward
-            overrides += chosen[0] != executed
+            overrides += overridden
             events |= event
             length += 1
-            observation = following
-            if event & _ENDED:
-                break
-        self._memory = memory
-        outcomes = self._outcomes
-        outcomes.assisted_return[place, episode] = total
-        outcomes.assisted_length[place, episode] = length
-        outcomes.overrides[place, episode] = overrides
-        outcomes.assisted_events[place, episode] = events
+        return total, length, events, overrides
 
-    def _greedy_episode(self, place: int, episode: int) -> None:
+    def _step(
+        self,
+        observation: np.ndarray,
+        epsilon: float,
+        helped: bool,
+        script: Any,
+        when: tuple[int, int],
+    ) -> tuple[np.ndarray, float, int, bool]:
+        """Where a step of training leads, its reward and events, and whether it was overridden."""
+        calls, streams, known, account = (
+            self._calls[helped], self._streams, self._known, self._account,
+        )  # fmt: skip
+        chosen = calls.act(
+            self._learner, self._expert, observation, known, streams, epsilon, helped,
+            self._options, self._memory, account, script,
+        )  # fmt: skip
+        if when[1] == 0:
+            self._condition.assistant.check_start(float(account[START_VALUE]))
+        proposed, executed = chosen[:2]
+        if not 0 <= executed < self._task.actions:
+            raise RequestError("the assistant's rule chose an action outside the action space")
+        following, reward, event = self._stepper.step(executed)
+        credited, projected, self._memory, sound = calls.take(
+            self._learner, self._brain, self._numbers, self._penalty, self._perception,
+            observation, following, chosen, reward, event, streams, known,
+            self._options if helped else None, self._memory, account, self._condition.discount,
+        )  # fmt: skip
+        if not sound:
+            raise self._not_finite(when[0], when[1], following, reward)
+        if self._rows is not None:
+            what = (when[0], observation, following, event, proposed, executed, credited)
+            how = (proposed != executed, *chosen[2:], known.copy(), projected, reward)
+            self._rows.append(what + how)
+        return following, reward, event, proposed != executed
+
+    def _greedy_episode(self, episode: int) -> tuple[float, int, int]:
+        """Return, length and events of an episode without help, exploration or learning."""
         stepper, learner, stream = self._stepper, self._learner, self._streams[EVALUATION]
+        _, _, prefer, finite = self._calls[True]
+        limit = self._task.episode_limit
         observation = self._begin(stream, episode)
         total, events, length = 0.0, 0, 0
-        while length < self._condition.task.episode_limit:
+        while length < limit and not events & _ENDED:
             observation, reward, event = stepper.step(prefer(learner, observation, stream))
-            if not (math.isfinite(reward) and np.isfinite(observation).all()):
+            if not finite(reward, observation):
                 raise self._not_finite(episode, length, observation, reward)
             total += reward
             events |= event
             length += 1
-            if event & _ENDED:
-                break
-        self._outcomes.unassisted_return[place, episode] = total
-        self._outcomes.unassisted_length[place, episode] = length
-        self._outcomes.unassisted_events[place, episode] = events
+        return total, length, events
 
     def _begin(self, stream: np.ndarray, episode: int) -> np.ndarray:
         observation = self._stepper.reset(draw(stream))
+        size = self._task.observation_size
+        if observation.dtype != np.float32 or observation.shape != (size,):
+            raise RequestError(
+                f"task {self._task.name}: an observation is {observation.dtype} "
+                f"{observation.shape}; float32 ({size},) is needed"
+            )
         if not np.isfinite(observation).all():
             raise self._not_finite(episode, -1, observation, 0.0)
         return observation
@@ -211,21 +246,6 @@ class _Trial:
         self, episode: int, length: int, observation: np.ndarray, reward: float
     ) -> RequestError:
         return RequestError(
-            f"task {self._condition.task.name}: trial {self._trial}, episode {episode}, step "
-            f"{length + 1}: observation {observation.tolist()}, reward {reward}; every number "
-            "must be finite"
+            f"task {self._task.name}: trial {self._number}, episode {episode}, step {length + 1}: "
+            f"observation {observation.tolist()}, reward {reward}; every number must be finite"
         )
-
-
-class _Calls(NamedTuple):
-    """The compiled calls of a step, or the same uncompiled for a rule that cannot be."""
-
-    act: Any
-    take: Any
-
-
-def _calls(condition: Condition) -> _Calls:
-    rule = condition.assistant.rule
-    if not rule.compiled:
-        return _Calls(uncompiled(act), uncompiled(take))
-    return _Calls(act, take) if rule.built_in else _Calls(_act_for_session, _take_for_session)

@@ -100,12 +100,10 @@ def take(
         was learned.
     """
     proposed, executed, probability, coin, tie = chosen
-    finite = np.isfinite(reward)
-    for i in range(len(following)):
-        finite = finite and np.isfinite(following[i])
+    sound = finite(reward, following)
     projected = projected_return(account[EARNED], account[DISCOUNT], known[proposed])
     experience = perceive(Perception(*perception), proposed, executed, reward, penalty)
-    if not finite:
+    if not sound:
         return experience.action, projected, memory, False
     if options is not None:
         step = Step(
@@ -122,3 +120,12 @@ def take(
     account[EARNED] += account[DISCOUNT] * reward
     account[DISCOUNT] *= gamma
     return experience.action, projected, memory, True
+
+
+@compiled_apart
+def finite(reward: float, observation: np.ndarray) -> bool:
+    """Whether a reward and every number of an observation [D] are finite."""
+    found = np.isfinite(reward)
+    for i in range(len(observation)):
+        found = found and np.isfinite(observation[i])
+    return found

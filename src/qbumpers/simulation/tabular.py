@@ -1,6 +1,6 @@
 """Simulated people at tabular tasks: thousands of trials in seconds."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -9,12 +9,14 @@ from qbumpers.learners import perception as named_perception
 from qbumpers.simulation.condition import Condition, outcome_room, streams
 from qbumpers.simulation.loops import run_trials, run_trials_for_session
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
+from qbumpers.tasks import TabularTask
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     """Simulate trials of a condition, one after another in compiled code."""
     outcomes = outcome_room(condition, len(trials))
-    counts = StateCounts(*(np.zeros(condition.task.states, np.int64) for _ in range(3)))
+    states = cast(TabularTask, condition.task).states
+    counts = StateCounts(*(np.zeros(states, np.int64) for _ in range(3)))
     _call_loops(condition, trials, seed, outcomes, counts, None, None)
     return Simulation(outcomes, counts)
 
@@ -56,7 +58,7 @@ def _call_loops(
     if not rule.compiled:
         loops = uncompiled(run_trials)
     return loops(
-        condition.task.dynamics(),
+        cast(TabularTask, condition.task).dynamics(),
         condition.values,
         condition.discount,
         condition.learner,

@@ -3,18 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
-import scipy.sparse.linalg
-from scipy import sparse
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks import TabularTask, Task
 from qbumpers.values.tabular import TabularValues
 
 DECIMALS = 9
 """Values are rounded so: actions that are equally good in truth must not differ by round-off."""
 
 
-def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
+def solve(task: Task, discount: float | None = None) -> TabularValues:
     """Q* of a task, exact up to rounding to nine decimals.
 
     Policy iteration, each policy evaluated by a linear solve. Undiscounted, it starts from a
@@ -30,9 +28,14 @@ def solve(task: TabularTask, discount: float | None = None) -> TabularValues:
         The values. Undiscounted, unreachable states without a proper policy have value 0.
 
     Raises:
-        RequestError: where the discount is out of range, or is 1 and a reachable state has no
-            proper policy, or values grow without bound.
+        RequestError: where the task has no table of transitions, the discount is out of range, or
+            is 1 and a reachable state has no proper policy, or values grow without bound.
     """
+    if not isinstance(task, TabularTask):
+        raise RequestError(
+            f"task {task.name} has no table of transitions to be solved: its values are learned, "
+            "see train_expert"
+        )
     discount = task.discount if discount is None else discount
     if not 0 < discount <= 1:
         raise RequestError(f"discount = {discount!r}; it must lie in (0, 1]")
@@ -83,6 +86,9 @@ def _policy_iteration(task: TabularTask, policy: np.ndarray, discount: float) ->
 
 def _evaluate(task: TabularTask, policy: np.ndarray, discount: float) -> np.ndarray:
     """V of a policy [S]: (I - discount P) V = r, float64 [S]."""
+    import scipy.sparse.linalg  # 4 MB that learners of vector tasks do without
+    from scipy import sparse
+
     states = np.arange(task.states)
     probability = task.probability[states, policy]
     reward = (probability * task.reward[states, policy]).sum(axis=1)

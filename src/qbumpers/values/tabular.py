@@ -15,6 +15,7 @@ import numpy as np
 import qbumpers
 from qbumpers.errors import RequestError
 from qbumpers.files import write_atomically
+from qbumpers.values.network import NetworkValues, network_values
 
 # What NumPy and the archive's reader raise at a file of another kind, or with a byte changed.
 _DAMAGE = (
@@ -107,8 +108,8 @@ class TabularValues:
         return buffer.getvalue()
 
 
-def load_values(path: str | Path) -> TabularValues:
-    """Read values that `TabularValues.save` wrote.
+def load_values(path: str | Path) -> TabularValues | NetworkValues:
+    """Read values that `TabularValues.save` or `NetworkValues.save` wrote.
 
     Args:
         path: of the file.
@@ -129,8 +130,8 @@ def load_values(path: str | Path) -> TabularValues:
     return decoded_values(content, str(path))
 
 
-def decoded_values(content: bytes, path: str) -> TabularValues:
-    """Values from the bytes of a file that `TabularValues.save` wrote.
+def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
+    """Values from the bytes of a file that `save` wrote.
 
     Args:
         content: of the file.
@@ -140,14 +141,20 @@ def decoded_values(content: bytes, path: str) -> TabularValues:
         The values.
 
     Raises:
-        RequestError: where it is no such file, or was changed since.
+        RequestError: where it is no such file, its arrays do not fit together, or it was changed
+            since.
     """
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            table = archive["table"]
-            provenance = json.loads(str(archive["provenance"]))
+            arrays = dict(archive.items())
+        provenance = json.loads(str(arrays.pop("provenance")))
         expected = provenance.pop("sha256")
-        values = TabularValues(table=table, **provenance)
+        if "table" in arrays:
+            values = TabularValues(table=arrays["table"], **provenance)
+        else:
+            values = network_values(arrays, provenance)
+    except RequestError as error:
+        raise RequestError(f"values file {path}: {error}") from error
     except _DAMAGE as error:
         raise RequestError(f"values file {path}: not a file of Q values ({error})") from error
     if values.digest() != expected:

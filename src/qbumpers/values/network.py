@@ -1,0 +1,155 @@
+"""Action values from a network, with their provenance, in memory and in a file."""
+
+import hashlib
+import io
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import qbumpers
+from qbumpers.errors import RequestError, checked
+from qbumpers.files import write_atomically
+from qbumpers.learners.network import Layout, Network, forward, named_parameters
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkValues:
+    """Q*(s, a) of a task whose observations are vectors, and where it comes from.
+
+    Attributes:
+        network: shape of the network.
+        inputs: D, numbers of an observation.
+        actions: A.
+        parameters: float32 [P], laid out as `qbumpers.learners.network` says, read-only.
+        discount: of the values.
+        task: name of the task.
+        method: how they were made, in words.
+        version: of the package that made them.
+
+    Raises:
+        RequestError: where the number of parameters does not suit the shape, one is not finite, or
+            the discount is out of range.
+    """
+
+    network: Network
+    inputs: int
+    actions: int
+    parameters: np.ndarray
+    discount: float
+    task: str
+    method: str
+    version: str = qbumpers.__version__
+
+    def __post_init__(self) -> None:
+        """Check everything and freeze the parameters."""
+        if not 0 < self.discount <= 1:
+            raise RequestError(
+                f"values of {self.task}: discount = {self.discount!r}; it must lie in (0, 1]"
+            )
+        parameters = np.array(self.parameters, np.float32)
+        needed = self.layout.parameters()
+        if parameters.shape != (needed,):
+            raise RequestError(
+                f"values of {self.task}: parameters have shape {parameters.shape}; a network of "
+                f"{self.inputs} inputs, {self.network.hidden} units and {self.actions} actions "
+                f"needs ({needed},)"
+            )
+        if not np.isfinite(parameters).all():
+            raise RequestError(f"values of {self.task}: every parameter must be finite")
+        parameters.flags.writeable = False
+        object.__setattr__(self, "parameters", parameters)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The network laid out."""
+        return self.network.layout(self.inputs, self.actions)
+
+    def __call__(self, observation: Any, /) -> np.ndarray:
+        """Q*(s, .) as float64 [A] of an observation [D], or [N, A] of several [N, D]."""
+        observations = np.asarray(observation, np.float32)
+        if observations.shape[-1:] != (self.inputs,) or observations.ndim > 2:
+            raise RequestError(
+                f"values of {self.task}: an observation has shape {observations.shape}; "
+                f"({self.inputs},) is needed"
+            )
+        states = observations.size // self.inputs
+        room = np.zeros(self.layout.room(states), np.float32)
+        room[: observations.size] = observations.ravel()
+        values = forward(self.layout, self.parameters, room, states).astype(np.float64)
+        return values[0] if observations.ndim == 1 else values
+
+    def digest(self) -> str:
+        """A SHA-256 of shape, parameters and discount: equal for values that decide alike."""
+        shape = json.dumps([*self.network, self.inputs, self.actions, self.discount])
+        return hashlib.sha256(shape.encode() + self.parameters.tobytes()).hexdigest()
+
+    def save(self, path: str | Path) -> None:
+        """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
+
+        Args:
+            path: of the file.
+
+        Raises:
+            StoreError: where it cannot be written.
+        """
+        content = self.encoded()
+        write_atomically(Path(path), lambda temporary: temporary.write_bytes(content))
+
+    def encoded(self) -> bytes:
+        """The values as the bytes of a NumPy `.npz` file."""
+        provenance = {
+            "network": self.network._asdict(),
+            "inputs": self.inputs,
+            "actions": self.actions,
+            "task": self.task,
+            "method": self.method,
+            "discount": self.discount,
+            "version": self.version,
+            "sha256": self.digest(),
+        }
+        buffer = io.BytesIO()
+        arrays: dict[str, Any] = named_parameters(self.layout, self.parameters)
+        np.savez_compressed(buffer, **arrays, provenance=json.dumps(provenance))
+        return buffer.getvalue()
+
+
+def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) -> NetworkValues:
+    """Values from the arrays and the provenance of a file that `NetworkValues.save` wrote.
+
+    Args:
+        arrays: by name, see `qbumpers.learners.network.named_parameters`.
+        provenance: without the hash.
+
+    Returns:
+        The values.
+
+    Raises:
+        KeyError: where the shape of the network is missing.
+        RequestError: where it is no possible one, or an array is missing or does not suit it.
+    """
+    shape = dict(provenance)
+    settings = dict(shape.pop("network"))
+    network = checked(Network, {**settings, "hidden": tuple(settings["hidden"])}, "network")
+    inputs = shape.pop("inputs")
+    actions = shape.pop("actions")
+    parts = []
+    for name, needed in named_shapes(network.layout(inputs, actions)).items():
+        found = arrays.get(name)
+        if found is None or (found.shape, found.dtype) != (needed, np.float32):
+            given = "is missing" if found is None else f"is {found.dtype} {list(found.shape)}"
+            raise RequestError(f"array {name} {given}; float32 {list(needed)} is needed")
+        parts.append(found.ravel())
+    return NetworkValues(network, inputs, actions, np.concatenate(parts), **shape)
+
+
+def named_shapes(layout: Layout) -> dict[str, tuple[int, ...]]:
+    """Shapes of a network's arrays by name, in the order of its parameters."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    for name, outputs, inputs in layout.layers():
+        shapes[f"{name}.weight"] = (inputs, outputs)
+        shapes[f"{name}.bias"] = (outputs,)
+    return shapes
