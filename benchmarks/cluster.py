@@ -11,7 +11,7 @@ from measuring import Row, Timed, alternate, compared, is_quick, seconds_of, sho
 
 from qbumpers.experiments.cells import Cell, tiles, trials_a_cell
 from qbumpers.experiments.cluster import BATCH_SECONDS, LOCAL, RayCluster
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
 from qbumpers.experiments.run import Executor, run_experiment
 from qbumpers.experiments.sources import reproduction
@@ -66,7 +66,7 @@ def bytes_a_cell(plan: Plan) -> Row:
     cells = [tiles(content, size, size)[0] for content in plan.conditions]
     sizes = [
         sum(map(len, finished.files.values()))
-        for finished in Threads()(plan, estimated_seconds(plan, cells))
+        for finished in ThisMachine()(plan, estimated_seconds(plan, cells))
     ]
     title = f"a cell of {size} trials of {plan.experiment.episodes} episodes"
     return Row(title, sum(sizes) / len(sizes) / 1e3, "kB")
@@ -74,7 +74,7 @@ def bytes_a_cell(plan: Plan) -> Row:
 
 def against_threads(cluster: RayCluster, plan: Plan, rounds: int) -> list[Row]:
     """Cells and sweeps through Ray, against as many threads."""
-    threads = Threads(cluster.cores)
+    threads = ThisMachine(cluster.cores)
     small = {
         "alone": a_cell(cluster, plan, alone=True),
         "in batches": a_cell(cluster, plan, alone=False),

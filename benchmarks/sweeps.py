@@ -11,7 +11,7 @@ from pathlib import Path
 from measuring import Row, Timed, alternate, compared, is_quick, seconds_of, show
 
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
 from qbumpers.experiments.run import Executor, run_experiment
 from qbumpers.experiments.sources import reproduction
@@ -34,7 +34,7 @@ class Processes:
             list(self(plan, dict.fromkeys(warming, 0.0)))
 
     def __call__(self, plan: Plan, seconds: dict[Cell, float]) -> Generator[Finished]:
-        """As `qbumpers.experiments.local.Threads`."""
+        """As `qbumpers.experiments.local.ThisMachine`."""
         futures = [
             self._pool.submit(finish, plan.conditions[cell.content], cell, plan.experiment.seed)
             for cell in seconds
@@ -96,10 +96,10 @@ def measure(quick: bool) -> list[Row]:
     estimated_seconds(plan, [Cell(content, 0, 1) for content in plan.conditions])  # compiles
     processes = Processes(plan)
     timed = {
-        "cells": sweep(plan, Threads(2), assembled=False),
-        "two threads": sweep(plan, Threads(2)),
+        "cells": sweep(plan, ThisMachine(2), assembled=False),
+        "two threads": sweep(plan, ThisMachine(2)),
         "engine": engine(plan),
-        "one thread": sweep(plan, Threads(1)),
+        "one thread": sweep(plan, ThisMachine(1)),
         "two processes": sweep(plan, processes),
     }
     rates = alternate(timed, 2 if quick else 7)

@@ -5,10 +5,11 @@ from pathlib import Path
 import polars as pl
 import tomli_w
 
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
+from tests.values.networks import network_of
 
 BUMPERS = {"name": "stochastic-q-bumpers", "alpha": [0.3, 0.7], "second": True}
 
@@ -25,6 +26,25 @@ PLAIN = {
     "assistants": [{"name": "none"}, {**BUMPERS, "v_min": -50.0}],
 }
 
+ASSISTANTS = [{"name": "none"}, {"name": "stochastic-q-bumpers", "alpha": 0.5, "v_min": -100.0}]
+
+
+def cart(folder, **changes):
+    """Settings of a tiny experiment with deep learners, and Q values of a file for it."""
+    path = Path(folder) / "cart.npz"
+    if not path.exists():
+        network_of(inputs=4, actions=2, task="CartPole-v1", discount=0.99).save(path)
+    return {
+        "name": "cart",
+        "task": {"name": "CartPole-v1", "discount": 0.99},
+        "values": str(path),
+        "assistants": ASSISTANTS,
+        "trials": 2,
+        "episodes": 5,
+        "seed": 3,
+        **changes,
+    }
+
 
 def settings(**changes):
     return {
@@ -40,7 +60,7 @@ def settings(**changes):
 
 def run_into(folder, *, workers=1, report=lambda progress: None, **changes):
     plan = make_plan(make_experiment(settings(**changes)))
-    run_experiment(plan, folder, executor=Threads(workers), report=report)
+    run_experiment(plan, folder, executor=ThisMachine(workers), report=report)
     return Path(folder)
 
 

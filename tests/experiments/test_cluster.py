@@ -22,7 +22,7 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
 from tests.assistants import own_rules
-from tests.experiments.examples import contents_of, settings
+from tests.experiments.examples import cart, contents_of, settings
 
 # Ray leaves sockets and files to the garbage collector, and starts threads before it forks.
 pytestmark = [
@@ -388,3 +388,11 @@ def test_batches_are_large_at_first_and_small_towards_the_end():
     assert lengths[0] == pytest.approx(10 / 8 / 4, abs=0.02)
     assert lengths == sorted(lengths, reverse=True)
     assert max(lengths[-8:]) <= cluster._SHORTEST_BATCH + 0.011
+
+
+@pytest.mark.slow
+def test_deep_learners_through_an_own_ray_are_those_of_processes(tmp_path):
+    plan = make_plan(make_experiment(cart(tmp_path)))
+    with RayCluster(LOCAL) as ray_cluster:
+        run_experiment(plan, tmp_path / "ray", executor=ray_cluster)
+    assert contents_of(tmp_path / "ray", *TABLES) == local_run(plan, tmp_path / "local")

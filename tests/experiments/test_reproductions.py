@@ -2,9 +2,10 @@
 
 import pytest
 
+from qbumpers.errors import RequestError
 from qbumpers.experiments.design import reproductions
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.sources import PROFILES, reproduction
+from qbumpers.experiments.sources import overlaid, profiles, reproduction
 
 # Figure 2: the settings of both methods, as the paper lists them.
 THRESHOLDS = [
@@ -19,6 +20,16 @@ FIGURE_2 = [
     *(f"stochastic-q-bumpers/alpha={alpha}" for alpha in BUMPERS),
 ]
 
+PROFILES = ("figures", "text")
+SENSITIVITY = {
+    "dueling": {".learners.0.network.dueling": (0, 256)},
+    "learning-rate-5e-4": {".learners.0.learning_rate": (1e-3, 5e-4)},
+    "long-exploration": {".learners.0.epsilon.fraction": (0.1, 1.0)},
+    "relu": {".learners.0.network.activation": ("tanh", "relu")},
+}
+TENTHS = [n / 10 for n in range(11)]
+EXTRA = [*(n / 100 for n in range(91, 100)), *(n / 1000 for n in range(991, 1000))]
+
 
 def leaves(data, path=""):
     """Every number and word of nested settings, by its path."""
@@ -28,8 +39,10 @@ def leaves(data, path=""):
     return {k: v for key, part in parts for k, v in leaves(part, f"{path}.{key}").items()}
 
 
-def test_there_is_one_published_experiment():
-    assert reproductions() == ["cliff-walking"]
+def test_there_are_two_published_experiments_with_their_profiles():
+    assert reproductions() == ["cliff-walking", "lunar-lander"]
+    assert profiles("cliff-walking") == list(PROFILES)
+    assert profiles("lunar-lander") == ["figures", *SENSITIVITY]
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -83,3 +96,125 @@ def test_changes_replace_fields_and_none_leaves_them():
     changed = reproduction("cliff-walking", trials=7, seed=None)
     assert changed.trials == 7
     assert changed.model_copy(update={"trials": 100}) == plain
+
+
+def alphas_of(experiment, name):
+    return [
+        named.assistant.options.alpha
+        for named in experiment.conditions()
+        if named.assistant.name == name
+    ]
+
+
+def differences(first, second):
+    """What differs between two experiments, by its path."""
+    before, after = (leaves(each.model_dump()) for each in (first, second))
+    assert before.keys() == after.keys()
+    return {path: (before[path], after[path]) for path in before if before[path] != after[path]}
+
+
+def test_figure_4_has_both_methods_by_tenths_and_18_more_thresholds():
+    experiment = reproduction("lunar-lander")
+    assert len(EXTRA) == 18
+    assert alphas_of(experiment, "stochastic-q-bumpers") == TENTHS
+    assert alphas_of(experiment, "local-q-thresholding") == sorted(TENTHS + EXTRA)
+    conditions = [named.condition for named in experiment.conditions()]
+    assert conditions[:2] == ["none", "maximal"]
+    assert len(set(conditions)) == len(conditions) == 2 + 11 + 29
+    assert (experiment.trials, experiment.episodes) == (10, 2000)
+    assert (experiment.task.name, experiment.values) == ("lunar-lander", "expert")
+    for named in experiment.conditions():
+        options = named.assistant.options._asdict()
+        assert options.get("second", False) is False
+        if named.assistant.name == "stochastic-q-bumpers":
+            assert (options["v_min"], options["p_max"]) == (0.0, 0.999)
+
+
+def test_the_people_of_figure_4_are_the_papers():
+    [design] = reproduction("lunar-lander").learners
+    learner = design.learner(task_discount=0.99)
+    assert (design.name, design.perception) == ("double-dqn", "transition")
+    assert tuple(learner.network) == ((64, 64), "tanh", 0)
+    assert (learner.discount, learner.learning_rate) == (0.99, 1e-3)
+    assert tuple(learner.epsilon) == (1.0, 0.02, 0.1)
+    assert (learner.batch_size, learner.replay_size, learner.learning_starts) == (32, 50_000, 1000)
+    assert (learner.target_every, learner.gradient_limit) == (1500, 10.0)
+
+
+@pytest.mark.parametrize("profile", SENSITIVITY)
+def test_a_sensitivity_profile_differs_in_one_thing_and_its_name(profile):
+    found = differences(reproduction("lunar-lander"), reproduction("lunar-lander", profile))
+    assert found.pop(".name") == ("lunar-lander", f"lunar-lander-{profile}")
+    assert found == SENSITIVITY[profile]
+
+
+@pytest.mark.parametrize("name", ["cliff-walking", "lunar-lander"])
+def test_given_alphas_replace_those_of_both_methods_and_nothing_else(name):
+    whole, fewer = (reproduction(name, alphas=alphas) for alphas in (None, [0.5, 1.0]))
+    for method in ("local-q-thresholding", "stochastic-q-bumpers"):
+        assert alphas_of(fewer, method) == [0.5, 1.0]
+    assert [named.condition for named in fewer.conditions()][:2] == ["none", "maximal"]
+    assert len(fewer.conditions()) == 2 + 2 * 2
+    same = {"name": whole.name, "assistants": whole.assistants}
+    assert fewer.model_copy(update=same) == whole
+
+
+@pytest.mark.parametrize("profile", ["figures", *SENSITIVITY])
+def test_the_quick_version_has_both_methods_and_a_folder_of_its_own(profile):
+    quick = reproduction("lunar-lander", profile, quick=True)
+    assert quick.name == reproduction("lunar-lander", profile).name + "-quick"
+    assert {named.assistant.name for named in quick.conditions()} == {
+        "none", "maximal", "local-q-thresholding", "stochastic-q-bumpers",
+    }  # fmt: skip
+    assert quick.learners == reproduction("lunar-lander", profile).learners
+    steps = len(quick.conditions()) * quick.trials * quick.episodes * 250
+    assert steps * 115e-6 / 2 < 200  # seconds on two cores, of the five minutes that it may take
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"trials": 2}, "lunar-lander"),  # as many more can be added to them later
+        ({"episodes": 2000}, "lunar-lander"),
+        ({"episodes": 50}, "lunar-lander-episodes-50"),
+        ({"alphas": [0.5, 1.0]}, "lunar-lander-alphas-0.5-1"),
+        ({"values": "my experts/best one.npz"}, "lunar-lander-values-best-one"),
+        ({"quick": True, "trials": 9}, "lunar-lander-quick"),
+        ({"quick": True, "episodes": 50, "alphas": [0]}, "lunar-lander-quick-episodes-50-alphas-0"),
+    ],
+)
+def test_what_cannot_go_on_where_the_published_one_was_has_another_name(changes, name):
+    made = reproduction("lunar-lander", **changes)
+    assert made.name == name
+    for field in changes.keys() & {"trials", "episodes", "values"}:
+        assert getattr(made, field) == changes[field]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"alphas": [0.5, 1.5]}, r"alpha = 1\.5: .*less than or equal to 1"),
+        ({"alphas": []}, r"alpha = \[\]; at least one value"),
+        ({"alphas": [0.5, 0.5]}, r"alpha=0\.5 occurs 2 times"),
+        ({"profile": "text"}, r"unknown profile 'text'.* Known: figures, dueling, learning-rate"),
+        ({"episodes": 0}, r"lunar-lander, profile figures: episodes = 0: "),
+    ],
+)
+def test_a_wrong_version_is_refused(changes, message):
+    with pytest.raises(RequestError, match=message):
+        reproduction("lunar-lander", **changes)
+
+
+def test_there_is_no_quick_version_of_what_takes_seconds():
+    with pytest.raises(RequestError, match=r"quick: cliff-walking has no quick version; --trials"):
+        reproduction("cliff-walking", quick=True)
+
+
+def test_settings_are_overlaid_table_by_table():
+    base = {"a": 1, "t": {"x": 1, "y": {"z": 2}}, "l": [{"p": 1, "q": 2}], "n": [1, 2]}
+    changes = {"b": 3, "t": {"y": {"z": 4}}, "l": [{"q": 5}], "n": [9]}
+    assert overlaid(base, changes) == {
+        "a": 1, "b": 3, "t": {"x": 1, "y": {"z": 4}}, "l": [{"p": 1, "q": 5}], "n": [9],
+    }  # fmt: skip
+    longer = {"l": [{"q": 5}, {"q": 6}]}
+    assert overlaid(base, longer)["l"] == longer["l"]

@@ -13,7 +13,7 @@ import qbumpers
 from qbumpers.assistants import make_assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.simulation import simulate
 from qbumpers.tasks import cliff_walking
@@ -271,8 +271,8 @@ def test_fewer_than_one_worker_is_refused(tmp_path, workers):
 
 
 def test_all_cores_are_used_unless_fewer_are_asked_for():
-    assert Threads().cores == os.cpu_count()
-    assert Threads(3).cores == 3
+    assert ThisMachine().cores == os.cpu_count()
+    assert ThisMachine(3).cores == 3
 
 
 @pytest.mark.parametrize("values", ["exact", "q-learning", "file"])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
@@ -57,8 +57,8 @@ def test_a_damaged_cell_is_reported_and_run_again(tmp_path):
     assert len(made.cells) == 1
 
 
-class Counting(Threads):
-    """Threads that remember which trials they ran."""
+class Counting(ThisMachine):
+    """The cores of this machine, and which trials they ran."""
 
     def __init__(self, workers=1):
         super().__init__(workers)
@@ -96,7 +96,7 @@ def test_tuning_uses_the_trials_of_a_run_and_ends_as_without_it(tmp_path):
 
 def test_the_number_of_workers_changes_nothing(tmp_path):
     for workers in (1, 3):
-        tune(real(), tmp_path / str(workers), -1e4, executor=Threads(workers))
+        tune(real(), tmp_path / str(workers), -1e4, executor=ThisMachine(workers))
     for name in ("tuning.csv", "tuning.toml"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "3" / name).read_bytes()
 

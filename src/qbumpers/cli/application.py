@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from typing import Annotated
@@ -52,13 +53,16 @@ def main() -> None:
 
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
-    """End at once on Ctrl-C, with a message; Typer by itself would end without one."""
+    """End at once on Ctrl-C or SIGTERM, with a message; Typer would end without one."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
     except KeyboardInterrupt:
         _say("stopped", "what is finished is kept; the same command goes on from there")
         sys.stdout.flush()
         os._exit(1)  # without waiting for threads whose cells would be thrown away
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _stop(status: int, kind: str, message: str) -> None:

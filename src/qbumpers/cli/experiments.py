@@ -11,24 +11,51 @@ from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, duration, interval, table, typeable
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
+from qbumpers.errors import RequestError
 
 
 @application.command()
 def reproduce(
     experiment: Annotated[
-        str, typer.Argument(help="Which one: cliff-walking.", metavar="EXPERIMENT")
+        str, typer.Argument(help="Which one: cliff-walking or lunar-lander.", metavar="EXPERIMENT")
     ],
     profile: Annotated[
         str,
         typer.Option(
-            help="Reading of the paper: 'figures' gives its published numbers, 'text' takes its "
-            "text literally.",
-            metavar="figures|text",
+            help="Setting of the experiment. 'figures': in which the paper's figure comes out. "
+            "Others of cliff-walking: 'text', which takes the paper's text literally. Others of "
+            "lunar-lander, to see what its result depends on: 'dueling', 'learning-rate-5e-4', "
+            "'long-exploration', 'relu'.",
+            metavar="figures|text|...",
         ),
     ] = "figures",
+    quick: Annotated[
+        bool,
+        typer.Option("--quick", help="A version of lunar-lander that takes a few minutes."),
+    ] = False,
     trials: Annotated[
         int | None,
         typer.Option(help="Simulated people a condition.", show_default="the paper's", metavar="N"),
+    ] = None,
+    episodes: Annotated[
+        int | None,
+        typer.Option(help="Of each trial.", show_default="the paper's", metavar="N"),
+    ] = None,
+    alphas: Annotated[
+        str | None,
+        typer.Option(
+            help="Of every assistant that has an alpha, for instance 0.5,0.8,1.",
+            show_default="the paper's",
+            metavar="A,A,...",
+        ),
+    ] = None,
+    values: Annotated[
+        str | None,
+        typer.Option(
+            help="Q values of the assistants: a file, for instance another expert.",
+            show_default="the profile's",
+            metavar="PATH",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of all random streams.", metavar="N")] = 0,
     workers: Workers = None,
@@ -37,14 +64,42 @@ def reproduce(
 ) -> None:
     """Repeat an experiment of the paper and hold the results against its numbers.
 
-    Writes tables, figures and report.html. A run that was stopped continues where it was.
+    Writes tables, figures and report.html. A run that was stopped continues where it was, and one
+    with more trials than before computes only those. Versions with other episodes, alphas or
+    values have output folders of their own.
+
+    Cliff Walking takes seconds. Lunar Lander takes hours at full size: begin with --quick.
 
     Example: qbumpers reproduce cliff-walking --trials 20 --out results/quick
+
+    Example: qbumpers reproduce lunar-lander --quick
+
+    Example: qbumpers reproduce lunar-lander --alphas 0.8,0.9,1 --trials 4 --episodes 1000
     """
     from qbumpers.experiments.sources import reproduction
 
     with stoppable():
-        _run(reproduction(experiment, profile, trials=trials, seed=seed), workers, on, out)
+        design = reproduction(
+            experiment,
+            profile,
+            alphas=None if alphas is None else _numbers(alphas),
+            quick=quick,
+            trials=trials,
+            episodes=episodes,
+            values=values,
+            seed=seed,
+        )
+        _run(design, workers, on, out)
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise RequestError(
+            f"alphas = {text!r}; numbers from 0 to 1 with commas between them are needed, for "
+            "instance 0.5,0.8,1"
+        ) from error
 
 
 @application.command()

@@ -36,25 +36,33 @@ def _list_assistants() -> Table:
 
 
 def _list_tasks() -> Table:
-    from qbumpers.tasks.registry import tabular_environments, task_names
+    from qbumpers.tasks.registry import tabular_environments, task_names, vector_environments
 
     listing = table("task", "what it is")
     for name in task_names():
         listing.add_row(name, "a task of this package")
     for name in tabular_environments():
         listing.add_row(name, "a Gymnasium environment with a transition table; give a discount")
+    for name in vector_environments():
+        listing.add_row(name, "a Gymnasium environment observed as a vector; give a discount")
     return listing
 
 
 def _list_learners() -> Table:
+    from qbumpers.experiments.learner_designs import LEARNERS
     from qbumpers.learners import PERCEPTIONS
 
     listing = table("learner", "perception", "credits when overridden", "penalised")
-    for name, perception in PERCEPTIONS.items():
-        credited = "its own action" if perception.credits_proposed else "the executed action"
-        if not perception.learns_when_overridden:
-            credited = "nothing"
-        listing.add_row("q-learning", name, credited, "yes" if perception.penalised else "no")
+    for learner in LEARNERS:
+        for name, perception in PERCEPTIONS.items():
+            credited = "its own action" if perception.credits_proposed else "the executed action"
+            if not perception.learns_when_overridden:
+                credited = "nothing"
+            listing.add_row(learner, name, credited, "yes" if perception.penalised else "no")
+    listing.caption = (
+        "Tasks with a transition table are learned by q-learning, tasks observed as vectors by "
+        "double-dqn."
+    )
     return listing
 
 

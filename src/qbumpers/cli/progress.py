@@ -3,16 +3,19 @@
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.text import Text
 
-from qbumpers.cli.console import ERRORS, OUTPUT
+from qbumpers.cli.console import ERRORS, OUTPUT, duration
 
 if TYPE_CHECKING:
     from qbumpers.experiments.run import Progress as Running
     from qbumpers.tuning import Progress as Tuning
+
+_TRUST = 4  # finished trials that weigh as much as what was expected before the first
 
 
 class TrialProgress:
@@ -29,7 +32,7 @@ class TrialProgress:
             BarColumn(),
             TextColumn("{task.completed:,.0f} of {task.total:,.0f} trials"),
             TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
+            _TimeLeft(),
         )
         self._bar = Progress(*columns, console=OUTPUT)
         self._waiting = OUTPUT.status("compiling and calibrating")
@@ -58,7 +61,67 @@ class TrialProgress:
                 ERRORS.print(f"damaged, to be made again: {escape(name)}", soft_wrap=True)
             self._announce(done)
             self._bar.start()
-            self._task = self._bar.add_task(self._what, total=done.of, rate="")
+            expected = getattr(done, "expected", None)  # a race cannot tell
+            self._before = Before(done.trials, expected)
+            self._task = self._bar.add_task(self._what, total=done.of, rate="", ends=None)
         seconds = max(time.monotonic() - self._begun, 1e-3)
-        rate = f"{done.steps / seconds / 1e6:.1f} million steps a second" if done.steps else ""
-        self._bar.update(self._task, completed=done.trials, rate=rate)
+        left = time_left(self._before, done.trials, done.of, seconds)
+        self._bar.update(
+            self._task,
+            completed=done.trials,
+            rate=rate(done.steps, seconds),
+            ends=None if left is None else time.monotonic() + left,
+        )
+
+
+class Before(NamedTuple):
+    """What was known before a run.
+
+    Attributes:
+        trials: that were there already.
+        expected: seconds that the others were to take; None where nobody can tell.
+    """
+
+    trials: int
+    expected: float | None
+
+
+class _TimeLeft(ProgressColumn):
+    """The time left, counted down between one finished trial and the next."""
+
+    def render(self, task: Task) -> Text:
+        """See Rich."""
+        ends = task.fields["ends"]
+        if ends is None or task.finished:
+            return Text("")
+        return Text(f"{duration(max(0.0, ends - time.monotonic()))} left")
+
+
+def time_left(before: Before, trials: int, of: int, seconds: float) -> float | None:
+    """Seconds that are left: as expected at first, more and more by what trials have taken.
+
+    Args:
+        before: what was known before the run.
+        trials: finished now.
+        of: trials of the whole run.
+        seconds: since the run began.
+
+    Returns:
+        The time; None where nothing is known yet.
+    """
+    finished, remaining = trials - before.trials, of - trials
+    if before.expected is None:
+        return seconds / finished * remaining if finished else None
+    trust = _TRUST / (finished + _TRUST)
+    usual = before.expected / max(1, of - before.trials)
+    measured = seconds / finished if finished else usual
+    return (trust * usual + (1 - trust) * measured) * remaining
+
+
+def rate(steps: int, seconds: float) -> str:
+    """How fast it goes, for instance "4.1 million steps a second"."""
+    if not steps:
+        return ""
+    speed = steps / seconds
+    number = f"{speed / 1e6:.1f} million" if speed >= 1e5 else f"{speed:,.0f}"
+    return f"{number} steps a second"

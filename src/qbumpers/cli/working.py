@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from qbumpers.experiments.run import Executor
 
 Workers = Annotated[
-    int | None, typer.Option(help="Threads to use.", show_default="all cores", metavar="N", min=1)
+    int | None, typer.Option(help="Cores to use.", show_default="all cores", metavar="N", min=1)
 ]
 On = Annotated[
     str | None,
@@ -35,11 +35,11 @@ Out = Annotated[
 
 @contextlib.contextmanager
 def executor_for(workers: int | None, on: str | None) -> Iterator["Executor"]:
-    """Where cells are worked on: threads of this machine, or a Ray cluster."""
-    from qbumpers.experiments.local import Threads
+    """Where cells are worked on: cores of this machine, or a Ray cluster."""
+    from qbumpers.experiments.local import ThisMachine
 
     if on is None:
-        yield Threads(workers)
+        yield ThisMachine(workers)
         return
     if workers is not None:
         raise RequestError(

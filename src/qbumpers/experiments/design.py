@@ -5,79 +5,51 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
-from qbumpers.learners import PERCEPTIONS, QLearner, Schedule
+from qbumpers.experiments.learner_designs import (
+    LearnerDesign,
+    Model,
+    apart,
+    suitable_learner,
+    written,
+)
+from qbumpers.learners import PERCEPTIONS
+from qbumpers.tasks import Task, make_task
 
-Value = bool | int | float | str
 
-
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class TaskDesign(_Model):
-    """Which task: a registered one by name, or a Gymnasium environment with a transition table.
+class TaskDesign(Model):
+    """Which task: a registered one by name, or a Gymnasium environment.
 
     Attributes:
         name: for instance "cliff-walking" or "FrozenLake-v1".
         discount: of a Gymnasium environment, in (0, 1].
         episode_limit: of a Gymnasium environment, in steps; its own where left out.
-        arguments: of a Gymnasium environment, for instance `{ is_slippery = true }`.
+        arguments: of the task, for instance `{ seed = 0 }` of "lunar-lander", or of a Gymnasium
+            environment, for instance `{ is_slippery = true }`.
     """
 
     name: str
     discount: Annotated[float, Field(gt=0, le=1)] | None = None
     episode_limit: Annotated[int, Field(ge=1)] | None = None
-    arguments: dict[str, Any] = {}
+    arguments: dict[str, Any] = Field(default_factory=dict)
 
-
-class ScheduleDesign(_Model):
-    """A number that changes linearly over the first `fraction` of the episodes, then stays."""
-
-    start: Annotated[float, Field(ge=0, le=1)] = 1.0
-    end: Annotated[float, Field(ge=0, le=1)] = 0.02
-    fraction: Annotated[float, Field(ge=0, le=1)] = 0.9
-
-
-class LearnerDesign(_Model):
-    """A simulated person. In a file, a field given as a list is swept over.
-
-    Attributes:
-        name: "q-learning".
-        perception: what they believe happened when they were overridden.
-        discount: of their values; the task's where left out.
-        epsilon: schedule of exploration.
-        learning_rate: schedule of the step size.
-        initial_value: of every action, in reward units.
-        penalty: what an override feels like to a learner who perceives disruption, in reward units.
-    """
-
-    name: Literal["q-learning"] = "q-learning"
-    perception: str = "transition"
-    discount: Annotated[float, Field(gt=0, le=1)] | None = None
-    epsilon: ScheduleDesign = ScheduleDesign()
-    learning_rate: ScheduleDesign = ScheduleDesign()
-    initial_value: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
-
-    def learner(self, task_discount: float) -> QLearner:
-        """The learner of this design, at a task of that discount."""
-        return QLearner(
-            discount=task_discount if self.discount is None else self.discount,
-            epsilon=Schedule(**self.epsilon.model_dump()),
-            learning_rate=Schedule(**self.learning_rate.model_dump()),
-            initial_value=self.initial_value,
-            penalty=self.penalty,
+    def task(self) -> Task:
+        """The task of this design; RequestError where there is none."""
+        return make_task(
+            self.name,
+            discount=self.discount,
+            episode_limit=self.episode_limit,
+            **self.arguments,
         )
 
 
-class AssistantDesign(_Model):
+class AssistantDesign(Model):
     """An assistant by name, with its options; an option given as a list is swept over."""
 
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
@@ -107,15 +79,18 @@ class NamedCondition(NamedTuple):
     learner_id: str
 
 
-class Experiment(_Model):
+class Experiment(Model):
     """An experiment: one task, the assistants to compare, and the people who learn with them.
 
     Attributes:
         name: of the experiment, and of its default output folder.
         reproduces: the published experiment to be compared with, for instance "cliff-walking".
         task: which task, as a table or just its name.
-        values: Q* of the assistants: "exact", "q-learning", or the path of a values file.
-        learners: the simulated people; every assistant meets each of them.
+        values: Q* of the assistants: "exact" or "q-learning" for a task with a table, "expert" for
+            the expert that ships for a task, or the path of a values file. Where left out, exact
+            for a task with a table, else the expert's.
+        learners: the simulated people; every assistant meets each of them. Where left out, the
+            paper's, who learn in the way that suits the task.
         assistants: what to compare; one for each combination of listed options.
         trials: people a condition.
         episodes: assisted episodes a trial, each followed by a greedy one without help.
@@ -129,8 +104,8 @@ class Experiment(_Model):
     name: Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
     reproduces: str | None = None
     task: TaskDesign
-    values: str = "exact"
-    learners: Annotated[list[LearnerDesign], Field(min_length=1)] = [LearnerDesign()]
+    values: str
+    learners: Annotated[list[LearnerDesign], Field(min_length=1)]
     assistants: Annotated[list[AssistantDesign], Field(min_length=1)]
     trials: Annotated[int, Field(ge=1)] = 100
     episodes: Annotated[int, Field(ge=1)] = 100
@@ -142,22 +117,17 @@ class Experiment(_Model):
     @model_validator(mode="before")
     @classmethod
     def _spelt_out(cls, settings: Any) -> Any:
-        """A task given by its name, and learners with listed fields, in full."""
+        """What is left out or written shortly, in full."""
         if not isinstance(settings, dict):
             return settings
-        settings = dict(settings)
+        settings = {"learners": [{}], **settings}
         if isinstance(settings.get("task"), str):
             settings["task"] = {"name": settings["task"]}
-        learners = settings.get("learners")
+        learners = settings["learners"]
         if isinstance(learners, list):
-            many = sum(combinations(each) for each in learners if isinstance(each, dict))
-            if many > MANY_CELLS:
-                raise RequestError(f"learners: {many:,} of them; at most {MANY_CELLS:,} are taken")
-            settings["learners"] = [
-                each
-                for learner in learners
-                for each in (swept(learner, "learner") if isinstance(learner, dict) else [learner])
-            ]
+            settings["learners"] = _all_learners(learners, settings.get("task"))
+            names = [one.get("name") for one in settings["learners"] if isinstance(one, dict)]
+            settings.setdefault("values", "expert" if "double-dqn" in names else "exact")
         return settings
 
     @model_validator(mode="after")
@@ -165,13 +135,23 @@ class Experiment(_Model):
         for learner in self.learners:
             if learner.perception not in PERCEPTIONS:
                 raise unknown_name("learners.perception", learner.perception, PERCEPTIONS)
+            if learner.name != self.learners[0].name:
+                raise RequestError(
+                    f"learners.name = {learner.name!r}; people of one experiment learn in the same "
+                    f"way, and the first ones by {self.learners[0].name!r}"
+                )
         if self.reproduces is not None and self.reproduces not in reproductions():
             raise unknown_name("reproduces", self.reproduces, reproductions())
         return self
 
+    @property
+    def tabular(self) -> bool:
+        """Whether its people learn a table, by the number of the state."""
+        return self.learners[0].name == "q-learning"
+
     def trials_a_cell(self) -> int:
-        """How many trials a whole cell has."""
-        return trials_a_cell(self.episodes + self.retention)
+        """How many trials a whole cell has: a deep learner's trial is long enough by itself."""
+        return trials_a_cell(self.episodes + self.retention) if self.tabular else 1
 
     def condition_count(self) -> int:
         """How many conditions there are, counted without making them."""
@@ -188,15 +168,39 @@ class Experiment(_Model):
         names = [condition_id(assistant, assistants) for assistant in assistants]
         everyone = []
         for learner in self.learners:
-            apart, learner_id = (_apart(learner, self.learners, mark) for mark in "@/")
+            addition, learner_id = (apart(learner, self.learners, mark) for mark in "@/")
             everyone += [
-                NamedCondition(name + apart, assistant, learner, learner.name + learner_id)
+                NamedCondition(name + addition, assistant, learner, learner.name + learner_id)
                 for name, assistant in zip(names, assistants, strict=True)
             ]
         for name, times in Counter(named.condition for named in everyone).items():
             if times > 1:
                 raise RequestError(f"condition {name} occurs {times} times; keep one")
         return everyone
+
+
+def _all_learners(learners: list[Any], task: Any) -> list[Any]:
+    """Learners by name, with listed fields swept over."""
+    tables = [each for each in learners if isinstance(each, dict)]
+    many = sum(map(combinations, tables))
+    if many > MANY_CELLS:
+        raise RequestError(f"learners: {many:,} of them; at most {MANY_CELLS:,} are taken")
+    if not all("name" in each for each in tables):
+        name = _learner_name(task)
+        learners = [{"name": name, **each} if isinstance(each, dict) else each for each in learners]
+    return [
+        each
+        for learner in learners
+        for each in (swept(learner, "learner") if isinstance(learner, dict) else [learner])
+    ]
+
+
+def _learner_name(task: Any) -> str:
+    """Name of the way in which people can learn a task, given as plain data."""
+    try:
+        return suitable_learner(TaskDesign.model_validate(task).task())
+    except (ValidationError, RequestError):
+        return "q-learning"  # what is wrong with the task is told where the task is needed
 
 
 def combinations(options: Mapping[str, Any]) -> int:
@@ -238,33 +242,11 @@ def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
     defaults = assistant.rule.options_type._field_defaults  # type: ignore[attr-defined]
     others = [a.options._asdict() for a in among if a.name == assistant.name]
     shown = [
-        f"{option}={_written(value)}"
+        f"{option}={written(value)}"
         for option, value in options.items()
         if option not in defaults or any(other[option] != value for other in others)
     ]
     return "/".join([assistant.name, ",".join(shown)]) if shown else assistant.name
-
-
-def _apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> str:
-    """What tells a learner from the others, after a mark; nothing where it is alone."""
-    if len(among) == 1:
-        return ""
-    fields = learner.model_dump()
-    others = [other.model_dump() for other in among]
-    shown = [
-        f"{field}={_written(value)}"
-        for field, value in fields.items()
-        if any(other[field] != value for other in others)
-    ]
-    return mark + ",".join(shown)
-
-
-def _written(value: Any) -> str:
-    if isinstance(value, dict):  # a schedule
-        return "..".join(_written(part) for part in value.values())
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def reproductions() -> list[str]:

@@ -1,19 +1,33 @@
 """An experiment made ready: checked as a whole, with nothing run yet."""
 
+import dataclasses
 import time
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experiments.learner_designs import suitable_learner
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import TabularTask, make_task
-from qbumpers.values import TabularValues, learn_values, load_values, solve
+from qbumpers.tasks import TabularTask, Task
+from qbumpers.values import (
+    NetworkValues,
+    TabularValues,
+    learn_values,
+    load_values,
+    shipped_expert,
+    solve,
+)
 
-_CALIBRATION = 0.01  # seconds that a timing should last, so that it means something
+_CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last to mean something
+_SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
+
+
+SOURCES = ("exact", "q-learning", "expert")
+"""What `values` of an experiment may say in place of a path."""
 
 
 class Plan(NamedTuple):
@@ -28,8 +42,8 @@ class Plan(NamedTuple):
     """
 
     experiment: Experiment
-    task: TabularTask
-    values: TabularValues
+    task: Task
+    values: TabularValues | NetworkValues
     named: list[tuple[NamedCondition, str]]
     conditions: dict[str, Condition]
 
@@ -46,13 +60,13 @@ def make_plan(experiment: Experiment) -> Plan:
     Raises:
         RequestError: where the task, values, a learner or an assistant is wrong.
     """
-    design = experiment.task
-    task = make_task(
-        design.name,
-        discount=design.discount,
-        episode_limit=design.episode_limit,
-        **design.arguments,
-    )
+    task = experiment.task.task()
+    for learner in experiment.learners:
+        if learner.name != suitable_learner(task):
+            raise RequestError(
+                f"learners.name = {learner.name!r}; at task {task.name} people learn by "
+                f"{suitable_learner(task)!r}"
+            )
     values = _values(experiment.values, task)
     named, conditions = [], {}
     for each in experiment.conditions():
@@ -72,11 +86,19 @@ def make_plan(experiment: Experiment) -> Plan:
     return Plan(experiment, task, values, named, conditions)
 
 
-def _values(source: str, task: TabularTask) -> TabularValues:
-    if source == "exact":
-        return solve(task)
-    if source == "q-learning":
-        return learn_values(task)
+def _values(source: str, task: Task) -> TabularValues | NetworkValues:
+    if isinstance(task, TabularTask):
+        made = {"exact": solve, "q-learning": learn_values}
+        if source in made:
+            return made[source](task)
+    elif source == "expert":
+        return shipped_expert(task.name)
+    if source in SOURCES:
+        allowed = "'exact', 'q-learning'" if isinstance(task, TabularTask) else "'expert'"
+        raise RequestError(
+            f"values = {source!r}; for task {task.name}, {allowed} or the path of a values file "
+            "is needed"
+        )
     values = load_values(source)
     if values.task != task.name:
         raise RequestError(f"values = {source!r}: they are of task {values.task}, not {task.name}")
@@ -84,26 +106,32 @@ def _values(source: str, task: TabularTask) -> TabularValues:
 
 
 def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
-    """How long cells will take on one core, from a short calibration of each assistant's speed.
+    """How long cells will take on one core, from a short calibration.
 
-    Compiles the assistants' loops where they are not compiled yet.
+    Compiles loops where they are not compiled yet.
 
     Args:
         plan: the experiment.
         cells: what is to be done.
 
     Returns:
-        Seconds of each cell, the longest first: the order in which workers end together.
+        Seconds of each cell, in the order in which they are to be worked on: the longest first, so
+        that workers end together; deep learners' by trial, so that a run that is stopped has
+        something of every condition.
     """
-    seconds: dict[str, float] = {}
+    seconds: dict[Any, float] = {}
     estimates = {}
     for cell in cells:
         condition = plan.conditions[cell.content]
-        name = condition.assistant.name
-        if name not in seconds:
-            seconds[name] = _seconds_a_trial(condition, plan.experiment.seed)
-        estimates[cell] = seconds[name] * cell.trials
-    return dict(sorted(estimates.items(), key=lambda item: -item[1]))
+        tabular = isinstance(condition.task, TabularTask)
+        alike = condition.assistant.name if tabular else condition.learner
+        if alike not in seconds:
+            measure = _seconds_a_trial if tabular else _seconds_a_deep_trial
+            seconds[alike] = measure(condition, plan.experiment.seed)
+        estimates[cell] = seconds[alike] * cell.trials
+    if plan.experiment.tabular:
+        return dict(sorted(estimates.items(), key=lambda item: -item[1]))
+    return dict(sorted(estimates.items(), key=lambda item: item[0].first))
 
 
 def _seconds_a_trial(condition: Condition, seed: int) -> float:
@@ -116,3 +144,25 @@ def _seconds_a_trial(condition: Condition, seed: int) -> float:
         if seconds > _CALIBRATION:
             return seconds / trials
         trials *= 4
+
+
+def _seconds_a_deep_trial(condition: Condition, seed: int) -> float:
+    """From a few short episodes of a learner that learns from its first step on."""
+    task: Any = condition.task
+    learner: Any = condition.learner
+    short = condition._replace(
+        task=dataclasses.replace(task, episode_limit=min(task.episode_limit, _SHORT)),
+        learner=learner._replace(learning_starts=1),
+        retention=0,
+    )
+    run_condition(short._replace(episodes=1), trials=1, seed=seed)
+    episodes = 2
+    while True:
+        begun = time.perf_counter()
+        simulation = run_condition(short._replace(episodes=episodes), trials=1, seed=seed)
+        seconds = time.perf_counter() - begun
+        if seconds > _DEEP_CALIBRATION:
+            break
+        episodes *= 4
+    steps = 2 * (condition.episodes + condition.retention) * min(task.episode_limit, _USUAL)
+    return seconds / simulation.steps * steps

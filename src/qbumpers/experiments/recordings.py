@@ -14,7 +14,7 @@ from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
 from qbumpers.simulation import Steps, record
-from qbumpers.tasks import TabularTask
+from qbumpers.tasks import TabularTask, Task
 from qbumpers.tasks.dynamics import TERMINATED
 
 INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
@@ -29,10 +29,10 @@ def export_recording(
 ) -> int:
     """Play trials of a finished run again and keep every training step as a Minari dataset.
 
-    Observations are numbers of states [N + 1], actions the executed ones [N]. `infos` has the same
-    keys in every episode, `INFOS` with `trial` and `episode`, as arrays [N + 1]: one entry for the
-    reset, where numbers are -1 or NaN, and one a step. Episodes in which the assistant is gone are
-    there too, with probability 0.
+    Observations are numbers of states [N + 1], or vectors [N + 1, D]; actions are the executed ones
+    [N]. `infos` has the same keys in every episode, `INFOS` with `trial` and `episode`, as arrays
+    [N + 1]: one entry for the reset, where numbers are -1 or NaN, and one a step. Episodes in which
+    the assistant is gone are there too, with probability 0.
 
     Args:
         folder: of the run.
@@ -75,9 +75,7 @@ def _checked(trials: int | range, run: int) -> range:
     return which
 
 
-def _write(
-    dataset: str, condition: str, task: TabularTask, episodes: Sequence[Mapping[str, Any]]
-) -> None:
+def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[str, Any]]) -> None:
     try:
         import minari
         from minari.data_collector import EpisodeBuffer
@@ -89,13 +87,19 @@ def _write(
             minari.create_dataset_from_buffers(
                 dataset,
                 [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
-                observation_space=gymnasium.spaces.Discrete(task.states),
+                observation_space=_observation_space(task),
                 action_space=gymnasium.spaces.Discrete(task.actions),
                 algorithm_name=condition,
                 description=f"Simulated people at {task.name}, assisted by {condition}.",
             )
         except ValueError as error:
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
+
+
+def _observation_space(task: Task) -> gymnasium.Space[Any]:
+    if isinstance(task, TabularTask):
+        return gymnasium.spaces.Discrete(task.states)
+    return gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
 
 
 def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
@@ -109,7 +113,7 @@ def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
         infos = {name: _after_reset(getattr(part, name)) for name in INFOS}
         numbers = {"trial": trial, "episode": int(part.episode[0])}
         yield {
-            "observations": np.append(part.state, part.next_state[-1]),
+            "observations": np.concatenate([part.state, part.next_state[-1:]]),
             "actions": part.executed,
             "rewards": part.reward,
             "terminations": terminated,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from qbumpers.experiments.cells import Cell, tiles
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds
 from qbumpers.experiments.store import open_store
 from qbumpers.experiments.work import Finished
@@ -56,14 +56,14 @@ def run_experiment(
     Args:
         plan: the experiment, made ready.
         folder: of the results; a killed run continues there.
-        executor: where to; threads on all cores of this machine where None.
+        executor: where to; all cores of this machine where None.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Raises:
         RequestError: where the folder holds another experiment, or another run is writing to it.
         StoreError: where results cannot be written; finished cells stay.
     """
-    executor = executor or Threads()
+    executor = executor or ThisMachine()
     design = plan.experiment
     with open_store(folder, design) as store:
         store.write_values(plan.values)

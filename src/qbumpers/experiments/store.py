@@ -20,7 +20,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
 from qbumpers.experiments.sources import make_experiment, parsed
 from qbumpers.files import Folder, StoreError, open_folder
-from qbumpers.values import TabularValues, decoded_values
+from qbumpers.values import NetworkValues, TabularValues, decoded_values
 
 EXPERIMENT, EPISODES, STATES, VALUES = (
     "experiment.toml",
@@ -29,9 +29,6 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
     "values.npz",
 )
 """Files of an output folder; design and platform, a row an episode, a row a state, Q*."""
-
-TABLES = (STATES, EPISODES)
-"""What a finished cell holds; in the order of writing."""
 
 NEEDED = (EXPERIMENT, EPISODES, STATES, VALUES)
 """What the analysis reads."""
@@ -57,14 +54,14 @@ class Results(NamedTuple):
     Attributes:
         experiment: as run.
         episodes: a row an episode.
-        states: a row a condition and state.
+        states: a row a condition and state; None where observations are vectors.
         values: Q* of the assistants.
     """
 
     experiment: Experiment
     episodes: pl.DataFrame
-    states: pl.DataFrame
-    values: TabularValues
+    states: pl.DataFrame | None
+    values: TabularValues | NetworkValues
 
 
 class Survey(NamedTuple):
@@ -87,10 +84,11 @@ class Store:
 
     Args:
         folder: of the results, locked.
+        tables: what a finished cell holds, see `tables_of`.
     """
 
-    def __init__(self, folder: Folder) -> None:
-        self._folder = folder
+    def __init__(self, folder: Folder, tables: Sequence[str]) -> None:
+        self._folder, self._tables = folder, tables
         self._files: dict[tuple[Cell, str], str] = {}
 
     def survey(self, contents: Iterable[str]) -> Survey:
@@ -117,7 +115,7 @@ class Store:
                 kind = f"{name['kind']}.parquet"
                 self._files[cell, kind] = file
                 kinds.setdefault(cell, set()).add(kind)
-            cells[content] = [cell for cell, found in kinds.items() if found == set(TABLES)]
+            cells[content] = [cell for cell, found in kinds.items() if found == set(self._tables)]
         return Survey(cells, damaged)
 
     def write(self, cell: Cell, files: Mapping[str, bytes]) -> None:
@@ -128,7 +126,7 @@ class Store:
             self._folder.write(name, content)
             self._files[cell, kind] = name
 
-    def write_values(self, values: TabularValues) -> None:
+    def write_values(self, values: TabularValues | NetworkValues) -> None:
         """Keep the assistants' Q*."""
         self._folder.write(VALUES, values.encoded())
 
@@ -142,7 +140,7 @@ class Store:
             StoreError: where a cell cannot be read, or a table cannot be written.
         """
         cells = [(named, cell) for named, chosen in parts for cell in chosen]
-        for kind in TABLES:
+        for kind in self._tables:
             with ThreadPoolExecutor() as pool:
                 table = pl.concat(
                     pool.map(lambda part, kind=kind: self._labelled(part[0], part[1], kind), cells)
@@ -162,6 +160,11 @@ class Store:
         if f"-{_digest(content)}." not in name:
             raise StoreError(f"{name} was changed while the run went on; run it again to mend it")
         return pl.read_parquet(io.BytesIO(content))
+
+
+def tables_of(experiment: Experiment) -> tuple[str, ...]:
+    """What a finished cell of an experiment holds, in the order of writing."""
+    return (STATES, EPISODES) if experiment.tabular else (EPISODES,)
 
 
 def encoded(table: pl.DataFrame) -> bytes:
@@ -214,10 +217,10 @@ def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
         if found is not None:
             _check_same(place, found, experiment)
             if _renamed(found, experiment):  # or a stopped run would pass old rows off as its own
-                for table in TABLES:
+                for table in tables_of(experiment):
                     place.remove(table)
         place.write(EXPERIMENT, _described(experiment).encode())
-        yield Store(place)
+        yield Store(place, tables_of(experiment))
 
 
 def load(folder: str | Path) -> Results:
@@ -236,21 +239,22 @@ def load(folder: str | Path) -> Results:
     experiment = _read_design(place)
     if experiment is None:
         raise RequestError(f"results folder {folder}: it holds no {EXPERIMENT}")
-    tables = [place.read(name) for name in (EPISODES, STATES)]
-    if None in tables:
+    contents = {name: place.read(name) for name in tables_of(experiment)}
+    if None in contents.values():
         raise _unfinished(place)
     try:
-        episodes, states = (pl.read_parquet(io.BytesIO(table or b"")) for table in tables)
+        tables = {n: pl.read_parquet(io.BytesIO(content or b"")) for n, content in contents.items()}
     except pl.exceptions.PolarsError as error:
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
+    episodes = tables[EPISODES]
     conditions = {named.condition for named in experiment.conditions()}
     rows = len(conditions) * experiment.trials * (experiment.episodes + experiment.retention)
     if episodes.height != rows or set(episodes["condition"].unique()) != conditions:
         raise _unfinished(place)
     values = decoded_values(place.read(VALUES) or b"", f"{folder}/{VALUES}")
-    return Results(experiment, episodes, states, values)
+    return Results(experiment, episodes, tables.get(STATES), values)
 
 
 def _unfinished(folder: Folder) -> RequestError:

@@ -7,9 +7,9 @@ import polars as pl
 
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.store import EPISODES, STATES, encoded
-from qbumpers.simulation import Condition, Simulation
+from qbumpers.simulation import Condition, Simulation, StateCounts
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import TabularTask
+from qbumpers.tasks import TabularTask, Task
 from qbumpers.tasks.dynamics import CRASH, SUCCESS
 
 
@@ -39,10 +39,9 @@ def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
         The cell with its tables, encoded.
     """
     simulation = run_condition(condition, trials=range(cell.first, cell.end), seed=seed)
-    tables = {
-        EPISODES: episode_table(condition, cell, simulation),
-        STATES: state_table(condition.task, simulation),
-    }
+    tables = {EPISODES: episode_table(condition, cell, simulation)}
+    if isinstance(condition.task, TabularTask) and simulation.counts is not None:
+        tables[STATES] = state_table(condition.task, simulation.counts)
     return Finished(cell, {kind: encoded(t) for kind, t in tables.items()}, simulation.steps)
 
 
@@ -71,10 +70,7 @@ def episode_table(condition: Condition, cell: Cell, simulation: Simulation) -> p
         "unassisted_length": outcomes.unassisted_length.ravel(),
         "overrides": outcomes.overrides.ravel(),
     }
-    known = {
-        "success": (condition.task.success is not None, SUCCESS),
-        "crash": (condition.task.crash is not None, CRASH),
-    }
+    known = known_events(condition.task)
     events = {
         "assisted": outcomes.assisted_events.ravel(),
         "unassisted": outcomes.unassisted_events.ravel(),
@@ -87,18 +83,27 @@ def episode_table(condition: Condition, cell: Cell, simulation: Simulation) -> p
     return pl.DataFrame(columns).with_columns(**flags)
 
 
-def state_table(task: TabularTask, simulation: Simulation) -> pl.DataFrame:
+def known_events(task: Task) -> dict[str, tuple[bool, int]]:
+    """Whether a task tells each kind of event, and the bit of it."""
+    if isinstance(task, TabularTask):
+        told = (task.success is not None, task.crash is not None)
+    else:
+        told = (task.has_success, task.has_crash)
+    return dict(zip(("success", "crash"), zip(told, (SUCCESS, CRASH), strict=True), strict=True))
+
+
+def state_table(task: TabularTask, counts: StateCounts) -> pl.DataFrame:
     """A row a state of one cell: how often it was acted in.
 
     Args:
         task: the task.
-        simulation: what happened.
+        counts: how often, by state.
 
     Returns:
         Columns state, row, column (null where the task is no grid), assisted, overridden and
         unassisted, in steps of the episodes with an assistant and of the greedy ones after them.
     """
-    columns = {"state": np.arange(task.states), **simulation.counts._asdict()}
+    columns = {"state": np.arange(task.states), **counts._asdict()}
     table = pl.DataFrame(columns)
     place = (pl.lit(None, pl.Int64), pl.lit(None, pl.Int64))
     if task.grid is not None:

@@ -28,7 +28,7 @@ from qbumpers.analysis.statistics import CONFIDENCE, Estimate, mean_interval
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import NamedCondition
-from qbumpers.experiments.local import Threads
+from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.run import Executor
 from qbumpers.experiments.store import open_store
@@ -134,7 +134,7 @@ def tune(
     _check(plan, floor, confidence)
     with quiet(), open_store(folder, plan.experiment) as store:
         store.write_values(plan.values)
-        trials = Trials(plan, store, executor or Threads(), report)
+        trials = Trials(plan, store, executor or ThisMachine(), report)
         verdicts, confidences = _decide(trials, floor, confidence)
         contenders = [
             _contender(trials, named, content, verdicts[content], confidences[content])

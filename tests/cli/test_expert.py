@@ -1,0 +1,130 @@
+"""`qbumpers expert`: solve, train, check."""
+
+import pytest
+
+from qbumpers import load_values, solve
+from qbumpers.cli import expert as command
+from qbumpers.tasks import make_task
+from qbumpers.values import TabularValues
+from tests.values.networks import constant, network_of
+
+POLE = ("CartPole-v1", "--discount", "0.9")
+QUICK = (*POLE, "--steps", "1500", "--opening", "0", "--hidden", "8", "--seeds", "2")
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def pole():
+    values = network_of(inputs=4, actions=2, task="CartPole-v1")
+    values.save("pole.npz")
+    return values
+
+
+def test_a_tabular_task_is_solved_exactly_and_kept(call):
+    status, output, _ = call("expert", "cliff-walking")
+    assert status == 0
+    assert "V of the start 87; over 148 states and actions the error is at most 0" in output
+    exact = solve(make_task("cliff-walking"))
+    assert load_values("cliff-walking.npz").digest() == exact.digest()
+
+
+def test_a_table_is_checked_against_the_exact_solution(call):
+    exact = solve(make_task("cliff-walking"))
+    wrong = TabularValues(exact.table + 0.25, 1.0, "cliff-walking", "off by a quarter")
+    wrong.save("wrong.npz")
+    status, output, _ = call("expert", "cliff-walking", "--check", "wrong.npz")
+    assert status == 0
+    assert "off by a quarter" in output
+    assert "the error is at most 0.25, its mean 0.25" in output
+
+
+def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
+    status, output, _ = call("expert", *QUICK, "--out", "expert.npz")
+    assert status == 0
+    assert "return, 10% after 50" in output
+    assert "Kept seed" in output
+    values = load_values("expert.npz")
+    assert "the best of seeds 0, 1; return" in values.method
+    assert values.network.hidden == (8,)
+    kept = sorted((tmp_path / "expert.npz.work").iterdir())
+    assert [path.name[:7] for path in kept] == ["seed-0-", "seed-1-"]
+    before = [path.stat().st_mtime_ns for path in kept]
+    digests = [load_values(path).digest() for path in kept]
+    assert values.digest() in digests
+    assert call("expert", *QUICK, "--out", "expert.npz")[0] == 0
+    assert [path.stat().st_mtime_ns for path in kept] == before
+
+
+def test_a_file_is_checked_and_drawn(call, pole, tmp_path):
+    status, output, _ = call("expert", *POLE, "--check", "pole.npz", "--figures", "drawn")
+    assert status == 0
+    assert "Off the greedy path values differ from what is achieved" in output
+    assert {path.name for path in (tmp_path / "drawn").iterdir()} == {
+        "pole-quality.png", "pole-quality.svg",
+    }  # fmt: skip
+
+
+def test_an_expert_worse_than_random_is_warned_of(call):
+    constant(0, 4, 2, task="CartPole-v1").save("fall.npz")
+    status, _, errors = call("expert", *POLE, "--check", "fall.npz")
+    assert status == 0
+    assert "warning: values of task CartPole-v1" in errors
+    assert "say nothing about the method" in errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("CartPole-v1",), "discount is missing"),
+        ((*POLE, "--hidden", "64,x"), "--hidden 64,x: whole numbers"),
+        ((*POLE, "--hidden", "0"), "expert: network.hidden.0 = 0"),
+        ((*POLE, "--activation", "elu"), "network.activation = 'elu'"),
+        ((*POLE, "--learning-rate", "7"), "learning_rate = 7.0"),
+        ((*POLE, "--opening", "-1"), "opening = -1"),
+        ((*POLE, "--check", "absent.npz"), "absent.npz: there is none"),
+        ((*POLE, "--figures", "drawn"), "--figures drawn: they are of a check"),
+        (("Acrobot-v1", "--discount", "0.9", "--check", "pole.npz"), "of task CartPole-v1, 4"),
+        (("cliff-walking", "--figures", "d", "--check", "pole.npz"), "a table needs none"),
+        (("cliff-walking", "--check", "pole.npz"), "pole.npz: a network"),
+        ((*POLE, "--check", "table.npz"), "table.npz: a table"),
+        (("Pendulum-v1", "--discount", "0.9"), "numbered actions"),
+    ],
+)
+def test_wrong_requests_are_named(call, pole, arguments, message):
+    solve(make_task("cliff-walking")).save("table.npz")
+    status, _, errors = call("expert", *arguments)
+    assert status == 2
+    assert message in " ".join(errors.split())
+
+
+def test_the_help_states_the_rule_of_choice(call):
+    status, output, _ = call("expert", "--help")
+    assert status == 0
+    said = " ".join(output.split())
+    for part in ("2% random actions", "10% random actions", "after 50 random actions"):
+        assert part in said
+    assert command.expert.__doc__
+
+
+def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_path):
+    from qbumpers.values import selection
+
+    original = selection.train_expert
+
+    def stopped(*arguments, seed, **fields):
+        if seed == 1:
+            raise RuntimeError("the lights went out")
+        return original(*arguments, seed=seed, **fields)
+
+    monkeypatch.setattr(selection, "train_expert", stopped)
+    assert call("expert", *QUICK)[0] == 1
+    [kept] = (tmp_path / "CartPole-v1.npz.work").iterdir()
+    before = kept.stat().st_mtime_ns
+    monkeypatch.setattr(selection, "train_expert", original)
+    assert call("expert", *QUICK)[0] == 0
+    assert kept.stat().st_mtime_ns == before
+    assert load_values("CartPole-v1.npz").inputs == 4
