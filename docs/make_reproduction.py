@@ -6,12 +6,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
-import jinja2
 import numpy as np
 import polars as pl
 from make_pictures import keep, shrink
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from writing import DOCS, measure, template
 
 import qbumpers
 from qbumpers import QLearner, Schedule, make_assistant, simulate
@@ -25,11 +25,11 @@ from qbumpers.analysis.section_4_1 import threshold_story
 from qbumpers.analysis.statistics import Estimate, mean_interval
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import PROFILES, reproduction
+from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experiments.store import Results, load
 from qbumpers.tasks import cliff_walking
+from qbumpers.values import TabularValues
 
-DOCS = Path(__file__).parent
 FIGURES = {
     "figures": (
         "frontier", "learning-curves", "heatmaps", "q-values", "threshold-maps",
@@ -41,7 +41,6 @@ NONE = "local-q-thresholding/alpha=1"
 THRESHOLDING = "local-q-thresholding/alpha=0.0195"
 LEARNING, PERFORMANCE = "stochastic-q-bumpers/alpha=0.7", "stochastic-q-bumpers/alpha=0.2"
 """The points that the paper compares: no help, a baseline, and a method matched in each measure."""
-PLUS_MINUS = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
 
 
 class Outcome(NamedTuple):
@@ -62,7 +61,7 @@ def make(folder: Path) -> None:
     """Run both profiles and write `reproduction.md` and its images into `folder`."""
     images = folder / "images"
     images.mkdir(parents=True, exist_ok=True)
-    outcomes = {profile: _run(profile, images) for profile in PROFILES}
+    outcomes = {profile: _run(profile, images) for profile in profiles("cliff-walking")}
     figures = outcomes["figures"]
     keep(tradeoff_figure(figures.findings.summary), images, "figure2")
     summaries = {profile: outcome.findings.summary for profile, outcome in outcomes.items()}
@@ -70,28 +69,23 @@ def make(folder: Path) -> None:
     shown = ["none", "maximal", LEARNING]
     curves = learning_curves(figures.results.episodes, shown)
     keep(curves_figure(curves, looks(NAMES)), images, "learning")
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(DOCS),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    filters = (number, per_cent, estimate, label, readable)
-    environment.filters |= {f.__name__: f for f in filters}
+    page = template("reproduction.md.j2")
+    page.environment.filters["label"] = label
+    values = figures.results.values
+    assert isinstance(values, TabularValues)
     thresholds = figures.findings.summary.filter(pl.col("assistant") == "local-q-thresholding")
-    page = environment.get_template("reproduction.md.j2").render(
+    text = page.render(
         version=qbumpers.__version__,
         experiment=figures.results.experiment,
         outcomes=outcomes,
         printed={axis: regret_of_points(printed_points(), axis) for axis in (0, 1)},
         own_points={axis: regret_of_points(figures.means, axis) for axis in (0, 1)},
         pooled={axis: pooled_regret(figures, axis) for axis in (0, 1)},
-        story=threshold_story(figures.results.values.table, thresholds["alpha"].to_list()),
+        story=threshold_story(values.table, thresholds["alpha"].to_list()),
         changes=list(changes()),
         measure=measure,
     )
-    (folder / "reproduction.md").write_text(page, encoding="utf-8")
+    (folder / "reproduction.md").write_text(text, encoding="utf-8")
 
 
 def _run(profile: str, images: Path) -> Outcome:
@@ -252,31 +246,6 @@ def _draw_means(axes: Axes, part: pl.DataFrame) -> None:
         part["assisted_mean"], part["unassisted_mean"], linestyle="none", markersize=8,
         marker=look.marker, color=look.colour, label=NAMES.get(name, name),
     )  # fmt: skip
-
-
-def number(value: float | None, digits: int = 1) -> str:
-    """A number for the page; a dash where there is none."""
-    if value is None or not np.isfinite(value):
-        return "–"
-    return f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
-
-
-def per_cent(value: float) -> str:
-    """A share in whole per cent."""
-    return number(100 * value, 0) + "%" if np.isfinite(value) else "–"
-
-
-def estimate(value: Estimate, digits: int = 1) -> str:
-    """A mean with half the width of its 95% interval."""
-    if not np.isfinite(value.mean):
-        return number(None)
-    half = (value.high - value.low) / 2
-    return f"{number(value.mean, digits)}{PLUS_MINUS}{number(half, digits)}"
-
-
-def measure(row: dict[str, Any], name: str) -> Estimate:
-    """A measure of a row of `summary.csv`."""
-    return Estimate(*(row[f"{name}_{part}"] for part in Estimate._fields))
 
 
 def label(row: Comparison) -> str:

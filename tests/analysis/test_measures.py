@@ -172,7 +172,7 @@ def test_samples_keep_the_order_of_conditions_trials_and_measures():
 
 def test_a_summary_is_a_macro_average_over_trials_with_an_interval_over_trials():
     table = episodes(retained=RETAINED)
-    found = summary(table, trial_measures(table, CRITERION), OPTIONS)
+    found = summary(trial_measures(table, CRITERION), OPTIONS, EPISODES, RETAINED)
     assert found["condition"].to_list() == list(CONDITIONS)
     for row in found.iter_rows(named=True):
         by_hand = [measured_by_hand(table, row["condition"], trial) for trial in range(TRIALS)]
@@ -188,7 +188,7 @@ def test_a_summary_is_a_macro_average_over_trials_with_an_interval_over_trials()
 
 def test_a_summary_says_what_a_condition_is():
     table = episodes(retained=RETAINED)
-    found = summary(table, trial_measures(table), OPTIONS)
+    found = summary(trial_measures(table), OPTIONS, EPISODES, RETAINED)
     assert found.columns[:9] == [
         "condition", "assistant", "learner", "alpha", "second", "zeal", "trials", "episodes",
         "retention_episodes",
@@ -203,13 +203,13 @@ def test_a_summary_says_what_a_condition_is():
 
 def test_conditions_without_options_have_no_columns_of_options():
     table = episodes().filter(pl.col("condition") == "none")
-    found = summary(table, trial_measures(table), {"none": {}})
+    found = summary(trial_measures(table), {"none": {}}, EPISODES)
     assert found.columns[:5] == ["condition", "assistant", "learner", "trials", "episodes"]
 
 
 def test_a_summary_has_columns_of_what_is_known_alone():
     table = episodes(known=False)
-    found = summary(table, trial_measures(table), OPTIONS)
+    found = summary(trial_measures(table), OPTIONS, EPISODES)
     known = [name for name in MEASURES if f"{name}_mean" in found.columns]
     left_out = {*EVENTS, "retention", "criterion_episodes", "criterion_reached"}
     assert set(MEASURES) - set(known) == left_out
@@ -222,14 +222,14 @@ def test_a_measure_known_of_some_conditions_is_null_elsewhere():
     trials = trial_measures(table).with_columns(
         assisted_crash=pl.when(helped).then("assisted_crash")
     )
-    found = summary(table, trials, OPTIONS)
+    found = summary(trials, OPTIONS, EPISODES)
     for part in ("mean", "low", "high"):
         assert found[f"assisted_crash_{part}"].is_null().to_list() == [True, False, False]
 
 
 def test_a_single_trial_has_means_and_no_intervals():
     table = episodes(trials=1)
-    found = summary(table, trial_measures(table, CRITERION), OPTIONS)
+    found = summary(trial_measures(table, CRITERION), OPTIONS, EPISODES)
     for row in found.iter_rows(named=True):
         by_hand = measured_by_hand(table, row["condition"], 0)
         for measure in set(MEASURES) - {"retention"}:
@@ -270,3 +270,25 @@ def test_the_course_of_overrides_is_a_rate_a_step_and_ends_with_the_training():
         assert found[0, episode] == pytest.approx(statistics.fmean(rates))
         assert found[1, episode] <= found[0, episode] <= found[2, episode]
     assert (override_curve(table, "none") == 0).all()
+
+
+def test_blocks_of_episodes_are_averaged_within_trials_first():
+    table = episodes(retained=RETAINED)
+    starts = np.array([0, 10, 20, EPISODES])
+    ends = [*starts[1:], EPISODES + RETAINED]
+    found = learning_curve(shuffled(table), "tutor/alpha=0.7", "unassisted_return", starts)
+    rates = override_curve(shuffled(table), "tutor/alpha=0.7", starts[:-1])
+    assert (found.shape, rates.shape) == ((3, 4), (3, 3))
+    for block, (first, end) in enumerate(zip(starts, ends, strict=True)):
+        rows = table.filter(pl.col("episode").is_between(first, end, closed="left"))
+        rows = rows.filter(condition="tutor/alpha=0.7")
+        means, shares = [], []
+        for trial in range(TRIALS):
+            own = rows.filter(trial=trial)
+            means.append(statistics.fmean(own["unassisted_return"]))
+            shares.append(sum(own["overrides"]) / sum(own["assisted_length"]))
+        margin = scipy.stats.t.ppf(0.975, TRIALS - 1) * statistics.stdev(means) / math.sqrt(TRIALS)
+        mean = statistics.fmean(means)
+        assert found[:, block] == pytest.approx([mean, mean - margin, mean + margin])
+        if end <= EPISODES:
+            assert rates[0, block] == pytest.approx(statistics.fmean(shares))

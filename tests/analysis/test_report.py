@@ -17,8 +17,8 @@ from qbumpers.experiments.store import load
 from tests.analysis.pages import Page, content, interval, number
 
 FIGURES = [
-    "frontier", "differences-from-none", "learning-curves", "sensitivity", "override-course",
-    "distribution", "heatmaps", "q-values", "threshold-maps", "threshold-shares",
+    "frontier", "tradeoffs", "differences-from-none", "learning-curves", "sensitivity",
+    "override-course", "distribution", "heatmaps", "q-values", "threshold-maps", "threshold-shares",
 ]  # fmt: skip
 SECTIONS = [
     "outcome", "frontier", "methods", "published", "control", "curves", "sensitivity",

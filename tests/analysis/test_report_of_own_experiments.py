@@ -42,8 +42,8 @@ def test_a_task_on_a_grid_has_maps_but_no_published_numbers_or_thresholds(tmp_pa
     assert not (tmp_path / "published.csv").exists()
     assert not (tmp_path / "regret.csv").exists()
     assert {path.stem for path in (tmp_path / "figures").iterdir()} == {
-        "frontier", "differences-from-none", "learning-curves", "override-course", "distribution",
-        "heatmaps",
+        "frontier", "tradeoffs", "differences-from-none", "learning-curves", "override-course",
+        "distribution", "heatmaps",
     }  # fmt: skip
 
 

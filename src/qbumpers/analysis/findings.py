@@ -1,4 +1,4 @@
-"""Every table of a report, from the results of a run."""
+"""Every table of a report, from the trials of a run."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
+from qbumpers.analysis.claims import Claim, judged
 from qbumpers.analysis.comparisons import RETURNS, advantages, against, methods, optimal, pooled
 from qbumpers.analysis.frontier import Regret, matched_regret
-from qbumpers.analysis.measures import summary, trial_measures, trial_samples
+from qbumpers.analysis.measures import summary, trial_samples
 from qbumpers.analysis.published import Comparison, compare, published_numbers
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.store import Results
 
 
 class LearnerFindings(NamedTuple):
@@ -57,6 +57,7 @@ class Findings(NamedTuple):
         trials: a row a trial.
         learners: what compares conditions, one for each kind of learner.
         comparisons: with printed numbers, empty where the experiment reproduces none.
+        claims: that the paper makes in words, judged; empty where the experiment reproduces none.
         headlines: what came out, in plain sentences; empty until `find` of a report adds them.
         cautions: what to keep in mind, in plain sentences; the same.
     """
@@ -65,6 +66,7 @@ class Findings(NamedTuple):
     trials: pl.DataFrame
     learners: list[LearnerFindings]
     comparisons: list[Comparison]
+    claims: Sequence[Claim] = ()
     headlines: Sequence[str] = ()
     cautions: Sequence[str] = ()
 
@@ -79,12 +81,18 @@ class Findings(NamedTuple):
         return self.learners[0].compared if self.regrets else None
 
 
-def find_tables(results: Results) -> Findings:
-    """Every table of a report, from the results of a run."""
-    experiment = results.experiment
+def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
+    """Every table of a report.
+
+    Args:
+        trials: from `trial_measures`.
+        experiment: as run.
+
+    Returns:
+        The tables, without sentences.
+    """
     options = {n.condition: n.assistant.options._asdict() for n in experiment.conditions()}
-    trials = trial_measures(results.episodes, experiment.criterion)
-    table = summary(results.episodes, trials, options)
+    table = summary(trials, options, experiment.episodes, experiment.retention)
     learners = [
         _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
         for index, part in enumerate(table.partition_by("learner", maintain_order=True))
@@ -93,7 +101,12 @@ def find_tables(results: Results) -> Findings:
     if not experiment.reproduces:
         return found
     printed = published_numbers(experiment.reproduces)
-    return found._replace(comparisons=compare(printed, table, found.regrets))
+    generator = np.random.default_rng([experiment.seed, len(learners), 7])
+    paired = experiment.common_random_numbers
+    return found._replace(
+        comparisons=compare(printed, table, found.regrets),
+        claims=judged(experiment.reproduces, trials, generator, paired),
+    )
 
 
 def _about(

@@ -97,6 +97,50 @@ def _best(other: np.ndarray, value: np.ndarray, among: np.ndarray) -> np.ndarray
     return np.stack([np.where(equal, other, -np.inf).max(axis=-1), top], axis=-1)
 
 
+def beaten_share(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """Share of the points of one method that some point of another beats.
+
+    Args:
+        ours: float64 [..., N, 2], assisted and unassisted; larger is better.
+        theirs: float64 [..., M, 2].
+
+    Returns:
+        float64 [...], the share of theirs that one of ours is as good as in both measures and
+        better than in one.
+    """
+    counts = np.zeros(theirs.shape[:-2])
+    for index in range(theirs.shape[-2]):
+        one = theirs[..., index, np.newaxis, :]
+        beats = np.all(ours >= one, axis=-1) & np.any(ours > one, axis=-1)
+        counts += np.any(beats, axis=-1)
+    return counts / theirs.shape[-2]
+
+
+def lead(ours: np.ndarray, theirs: np.ndarray, axis: int) -> np.ndarray:
+    """How far one method leads in one measure, where both are equal in the other.
+
+    Args:
+        ours: float64 [..., N, 2], assisted and unassisted; larger is better.
+        theirs: float64 [..., M, 2].
+        axis: of the equal measure: 0 matches assisted performance, 1 unassisted learning.
+
+    Returns:
+        float64 [...], what ours reach at the level of each of theirs, minus what that one has, on
+        average over those whose level ours reach; NaN where that is none.
+    """
+    leads = np.stack(
+        [
+            at_matched(ours, theirs[..., index, axis], axis) - theirs[..., index, 1 - axis]
+            for index in range(theirs.shape[-2])
+        ],
+        axis=-1,
+    )
+    reached = np.isfinite(leads)
+    total = np.where(reached, leads, 0.0).sum(axis=-1)
+    number = reached.sum(axis=-1)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
 class Regret(NamedTuple):
     """How much less a method loses than a baseline, where both are equally good otherwise.
 

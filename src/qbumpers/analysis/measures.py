@@ -154,21 +154,25 @@ def trial_samples(trials: pl.DataFrame, *measures: str) -> dict[str, np.ndarray]
 
 
 def summary(
-    episodes: pl.DataFrame, trials: pl.DataFrame, options: Mapping[str, Mapping[str, Any]]
+    trials: pl.DataFrame,
+    options: Mapping[str, Mapping[str, Any]],
+    episodes: int,
+    retention: int = 0,
 ) -> pl.DataFrame:
     """A row a condition: means over trials with 95% intervals over trials.
 
     Args:
-        episodes: as in `episodes.parquet`.
         trials: from `trial_measures`.
         options: of each condition, by its id.
+        episodes: of training, a trial.
+        retention: further episodes without the assistant, a trial.
 
     Returns:
         The table of `summary.csv`: what a condition is, how much of it was run, and
         `<measure>_mean`, `_low` and `_high` of every measure that is known.
     """
     known = [name for name in MEASURES if trials[name].null_count() < trials.height]
-    counts = _counts(episodes)
+    counts = {"episodes": episodes, **({"retention_episodes": retention} if retention else {})}
     names = list(dict.fromkeys(name for chosen in options.values() for name in chosen))
     leading = [name for name in ("alpha", "second") if name in names]
     rows = []
@@ -185,13 +189,6 @@ def summary(
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
-def _counts(episodes: pl.DataFrame) -> dict[str, int]:
-    """Episodes a trial; those of retention only where there are any."""
-    lengths = dict(episodes.group_by("retention").agg(pl.col("episode").n_unique()).iter_rows())
-    retained = {"retention_episodes": lengths[True]} if True in lengths else {}
-    return {"episodes": lengths.get(False, 0), **retained}
-
-
 def _columns(measure: str, values: np.ndarray) -> dict[str, float | None]:
     """The three columns of a measure; null where unknown."""
     numbers = mean_interval(values)._asdict() if len(values) else {}
@@ -201,33 +198,56 @@ def _columns(measure: str, values: np.ndarray) -> dict[str, float | None]:
     }
 
 
-def learning_curve(episodes: pl.DataFrame, condition: str, column: str) -> np.ndarray:
-    """Mean and 95% interval of a measure in each episode, over trials.
+def learning_curve(
+    episodes: pl.DataFrame, condition: str, column: str, starts: np.ndarray | None = None
+) -> np.ndarray:
+    """Mean and 95% interval over trials of a measure, by episode or by block of episodes.
 
     Args:
         episodes: as in `episodes.parquet`.
         condition: which one.
         column: for instance "unassisted_return".
+        starts: int [B], the episodes with which blocks begin, the first of them 0; every episode is
+            a block where None.
 
     Returns:
-        float64 [3, E]: mean, low, high.
+        float64 [3, B]: mean, low, high.
     """
-    chosen = episodes.filter(pl.col("condition") == condition).sort("trial", "episode")
-    length = chosen["episode"].n_unique()
-    table = chosen[column].cast(pl.Float64).to_numpy().reshape(-1, length)
-    return np.array([mean_interval(values) for values in table.T]).T
+    values = _by_trial(episodes, condition, column)
+    return _course(_block_sums(values, starts) / _block_sums(np.ones_like(values), starts))
 
 
-def override_curve(episodes: pl.DataFrame, condition: str) -> np.ndarray:
-    """Mean and 95% interval of the override rate in each training episode, over trials.
+def override_curve(
+    episodes: pl.DataFrame, condition: str, starts: np.ndarray | None = None
+) -> np.ndarray:
+    """Mean and 95% interval over trials of the override rate in training.
 
     Args:
         episodes: as in `episodes.parquet`.
         condition: which one.
+        starts: int [B] of training, as for `learning_curve`.
 
     Returns:
-        float64 [3, E]: mean, low, high; overrides a step.
+        float64 [3, B]: mean, low, high; overrides a step.
     """
-    rate = pl.col("overrides") / pl.col("assisted_length")
-    training = episodes.filter(~pl.col("retention")).with_columns(override_rate=rate)
-    return learning_curve(training, condition, "override_rate")
+    training = episodes.filter(~pl.col("retention"))
+    overrides, steps = (
+        _block_sums(_by_trial(training, condition, column), starts)
+        for column in ("overrides", "assisted_length")
+    )
+    return _course(overrides / steps)
+
+
+def _by_trial(episodes: pl.DataFrame, condition: str, column: str) -> np.ndarray:
+    """A column of a condition, float64 [T, E]."""
+    chosen = episodes.filter(pl.col("condition") == condition).sort("trial", "episode")
+    length = chosen["episode"].n_unique()
+    return chosen[column].cast(pl.Float64).to_numpy().reshape(-1, length)
+
+
+def _block_sums(values: np.ndarray, starts: np.ndarray | None) -> np.ndarray:
+    return values if starts is None else np.add.reduceat(values, starts, axis=1)
+
+
+def _course(values: np.ndarray) -> np.ndarray:
+    return np.array([mean_interval(column) for column in values.T]).T

@@ -7,9 +7,11 @@ from typing import Any
 
 import polars as pl
 
+from qbumpers.analysis.claims import Claim
 from qbumpers.analysis.figures.style import save
 from qbumpers.analysis.findings import Findings, LearnerFindings, find_tables
 from qbumpers.analysis.frontier import Regret
+from qbumpers.analysis.measures import trial_measures
 from qbumpers.analysis.page.drawings import Drawing, drawings
 from qbumpers.analysis.page.headlines import cautions, headlines
 from qbumpers.analysis.page.layout import Picture, page
@@ -17,21 +19,23 @@ from qbumpers.analysis.published import Comparison
 from qbumpers.analysis.section_4_1 import ThresholdStory, threshold_story
 from qbumpers.experiments.store import Results, load
 from qbumpers.files import write_atomically
+from qbumpers.values import TabularValues
 
 REPORT, SUMMARY, TRIALS = "report.html", "summary.csv", "trials.parquet"
 """The page; a row a condition; a row a trial."""
 
-METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED = (
+METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED, CLAIMS = (
     "methods.csv",
     "advantages.csv",
     "differences.csv",
     "regret.csv",
     "published.csv",
+    "claims.csv",
 )
 """Written where there is something to compare."""
 
 FIGURES = "figures"
-_OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED)
+_OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED, CLAIMS)
 _FIGURE_FILES = {".png", ".svg", ".csv"}
 
 
@@ -75,7 +79,8 @@ def write_report(
 
 def find(results: Results) -> Findings:
     """Every table of a report and what they say in sentences, from the results of a run."""
-    found = find_tables(results)
+    trials = trial_measures(results.episodes, results.experiment.criterion)
+    found = find_tables(trials, results.experiment)
     return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
 
 
@@ -91,6 +96,7 @@ def _tables(findings: Findings) -> dict[str, pl.DataFrame]:
             [_flat(about, m, r) for about in everyone for m, r in about.regrets.items()]
         ),
         PUBLISHED: pl.DataFrame([_compared(row) for row in findings.comparisons]),
+        CLAIMS: pl.DataFrame([row for claim in findings.claims for row in _judged(claim)]),
     }
     return {name: table for name, table in tables.items() if table.height}
 
@@ -124,12 +130,31 @@ def _compared(row: Comparison) -> dict[str, Any]:
     }
 
 
+def _judged(claim: Claim) -> list[dict[str, Any]]:
+    return [
+        {
+            "claim": claim.title,
+            "verdict": claim.verdict,
+            "condition": row.condition,
+            "what": row.what,
+            **{f"estimate_{part}": number for part, number in row.estimate._asdict().items()},
+            "wanted": row.wanted,
+            "limit": float(row.limit),
+            "speaks_for": row.speaks_for,
+        }
+        for row in claim.evidence
+    ]
+
+
 def _story(results: Results, findings: Findings) -> ThresholdStory | None:
     thresholding = findings.summary.filter(assistant="local-q-thresholding")
+    values = results.values
     if results.experiment.task.name != "cliff-walking" or not thresholding.height:
         return None
+    if not isinstance(values, TabularValues):
+        return None
     return threshold_story(
-        results.values.table, thresholding["alpha"].unique(maintain_order=True).to_list()
+        values.table, thresholding["alpha"].unique(maintain_order=True).to_list()
     )
 
 

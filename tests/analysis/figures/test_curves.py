@@ -5,6 +5,8 @@ import polars as pl
 import pytest
 
 from qbumpers.analysis.figures.curves import (
+    MOST_POINTS,
+    block_size,
     courses_figure,
     curves_figure,
     learning_curves,
@@ -133,3 +135,34 @@ def test_more_of_each_are_spread_evenly():
     assert places == [0, 2, 4]
     firsts = [next(iter(THRESHOLDS)), next(iter(BUMPERS))]
     assert representative(summary_table(), each=1)[2:] == firsts
+
+
+def test_long_trainings_are_drawn_by_blocks_that_retention_does_not_share():
+    table = episodes_of(CHOSEN[:1], retained=30, episodes=250 + 30)
+    size = block_size(250)
+    assert size == 3
+    found = learning_curves(table, CHOSEN[:1])
+    assert found.height == 84 + 10
+    assert found["episode"].head(2).to_list() == [2, 5]  # of episodes 1 to 3, and 4 to 6
+    assert found["retention"].to_list() == [False] * 84 + [True] * 10
+    assert found.row(83, named=True)["episode"] == 250  # alone in the last block
+    first = table.filter(pl.col("episode") < size)["unassisted_return"].to_numpy().mean()
+    assert found["unassisted_return_mean"][0] == pytest.approx(first)
+    assert override_courses(table, CHOSEN[:1]).height == 84
+
+
+def test_the_blocks_of_a_training_are_never_more_than_can_be_told_apart():
+    for length in (1, 99, 100, 101, 1999, 2000):
+        assert -(-length // block_size(length)) <= MOST_POINTS
+    assert [block_size(length) for length in (1, 100, 101, 2000)] == [1, 1, 2, 20]
+
+
+def test_rates_are_drawn_in_per_cent_whatever_is_asked_for():
+    table = episodes_of().with_columns(
+        assisted_success=pl.col("episode") > 2, unassisted_success=pl.lit(value=False)
+    )
+    drawing = curves_figure(learning_curves(table, CHOSEN, "success"), DRAWN, "success")
+    for axes, expected in zip(drawing.axes, ([0, 0, 0, 100, 100, 100], [0] * 6), strict=True):
+        assert axes.get_ylabel() == "episodes that succeed, per cent"
+        assert axes.get_ylim() == (-4, 104)
+        assert axes.lines[0].get_ydata().tolist() == expected

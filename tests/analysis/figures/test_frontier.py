@@ -5,6 +5,7 @@ import polars as pl
 import pytest
 
 from qbumpers.analysis.figures.frontier import frontier_figure, overriding
+from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN
 from qbumpers.analysis.figures.style import looks, setting
 from tests.analysis.examples import (
     BUMPERS,
@@ -214,3 +215,21 @@ def test_single_trials_have_points_without_bars():
     drawing = drawn_from(table)
     drawing.draw_without_rendering()
     assert_points(drawing.axes[1], table)
+
+
+def test_of_a_large_cluster_so_many_are_labelled_as_there_is_room_for_spread_over_all():
+    rows = [
+        summary_row(f"local-q-thresholding/alpha=0.{place:03d}", place / 1000, 0)
+        for place in range(100, 140)
+    ]
+    cluster = pl.DataFrame(rows).with_columns(
+        assisted_mean=50 + pl.int_range(40) / 500,
+        unassisted_mean=-500.0 - pl.int_range(40) / 100,
+        pareto=pl.int_range(40) == 7,
+    )
+    rest = summary_table({"none": None, **BUMPERS}).with_columns(pareto=pl.lit(value=False))
+    drawing = drawn_from(pl.concat([cluster, rest], how="vertical_relaxed"))
+    [panel] = [axes for axes in drawing.axes if axes.get_title(loc="left").startswith("Local")]
+    labels = sorted(text.get_text().strip() for text in panel.texts)
+    assert len(labels) == MOST_IN_A_COLUMN
+    assert {"α = 0.100", "α = 0.107", "α = 0.139"} <= set(labels)

@@ -71,7 +71,7 @@ def told(*learners):
          "Q-Thresholding (95% interval of the reduction \N{MINUS SIGN}13% to 1%)."),
         (SOME, Estimate(0.5, math.nan, math.nan),
          "At matched performance, Stochastic Q Bumpers has 50% less regret in learning than Local "
-         "Q-Thresholding (too few trials for an interval)."),
+         "Q-Thresholding (its interval is not known)."),
         (NAN, NAN,
          "At matched performance, no setting of Stochastic Q Bumpers reaches the level of Local "
          "Q-Thresholding."),

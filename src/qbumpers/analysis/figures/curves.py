@@ -1,7 +1,7 @@
 """What happens by episode: learning curves, and the course of overrides."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -18,7 +18,15 @@ from qbumpers.analysis.figures.style import (
 )
 from qbumpers.analysis.measures import learning_curve, override_curve
 
-_PANELS = {"assisted_return": "With the assistant", "unassisted_return": "Without it"}
+MOST_POINTS = 100
+"""Curves of longer trainings are of means over blocks of episodes, so many or fewer."""
+
+_UNITS = {
+    "return": "return",
+    "success": "episodes that succeed, per cent",
+    "crash": "episodes that crash, per cent",
+}
+_PANELS = {"assisted": "With the assistant", "unassisted": "Without it"}
 
 
 def representative(summary: pl.DataFrame, each: int = 2) -> list[str]:
@@ -41,24 +49,56 @@ def representative(summary: pl.DataFrame, each: int = 2) -> list[str]:
     return chosen
 
 
-def learning_curves(episodes: pl.DataFrame, conditions: Sequence[str]) -> pl.DataFrame:
-    """Returns by episode, with 95% intervals over trials.
+def block_size(training: int) -> int:
+    """How many successive episodes of a training make a point of a curve."""
+    return max(1, -(-training // MOST_POINTS))
+
+
+class _Blocks(NamedTuple):
+    """Blocks of episodes.
+
+    Attributes:
+        starts: int [B], the first episodes, from 0; retention begins a block.
+        middles: float64 [B], the middles, of episodes counted from 1.
+        retained: bool [B], whether they are of retention.
+    """
+
+    starts: np.ndarray
+    middles: np.ndarray
+    retained: np.ndarray
+
+
+def _blocks(episodes: pl.DataFrame) -> _Blocks:
+    length = episodes["episode"].n_unique()
+    training = episodes.filter(~pl.col("retention"))["episode"].n_unique()
+    size = block_size(training)
+    starts = np.concatenate([np.arange(0, training, size), np.arange(training, length, size)])
+    widths = np.diff(np.append(starts, length))
+    return _Blocks(starts, starts + (widths + 1) / 2, starts >= training)
+
+
+def learning_curves(
+    episodes: pl.DataFrame, conditions: Sequence[str], measure: str = "return"
+) -> pl.DataFrame:
+    """A measure by episode, with 95% intervals over trials.
 
     Args:
         episodes: as in `episodes.parquet`.
         conditions: which ones.
+        measure: "return", "success" or "crash".
 
     Returns:
-        A row a condition and episode: condition, episode (from 1), retention, and `_mean`, `_low`
-        and `_high` of `assisted_return` and `unassisted_return`.
+        A row a condition and episode, or block of episodes where there are more than
+        `MOST_POINTS`: condition, episode (from 1; the middle of a block), retention, and `_mean`,
+        `_low` and `_high` of the measure's `assisted_` and `unassisted_` column.
     """
-    retained = episodes.filter("retention")["episode"].min()
+    blocks = _blocks(episodes)
     parts = []
     for condition in conditions:
-        curves = {column: learning_curve(episodes, condition, column) for column in _PANELS}
-        part = _course(condition, curves)
-        first = part.height + 1 if retained is None else int(str(retained)) + 1
-        parts.append(part.with_columns(retention=pl.col("episode") >= first))
+        names = [f"{side}_{measure}" for side in _PANELS]
+        curves = {name: learning_curve(episodes, condition, name, blocks.starts) for name in names}
+        part = _course(condition, curves, blocks.middles)
+        parts.append(part.with_columns(retention=pl.Series(blocks.retained)))
     return pl.concat(parts)
 
 
@@ -70,43 +110,53 @@ def override_courses(episodes: pl.DataFrame, conditions: Sequence[str]) -> pl.Da
         conditions: which ones.
 
     Returns:
-        A row a condition and episode: condition, episode (from 1), `override_rate_mean`, `_low`
-        and `_high`.
+        A row a condition and episode, or block of episodes as for `learning_curves`: condition,
+        episode (from 1; the middle of a block), `override_rate_mean`, `_low` and `_high`.
     """
-    parts = [_course(c, {"override_rate": override_curve(episodes, c)}) for c in conditions]
-    return pl.concat(parts)
+    blocks = _blocks(episodes.filter(~pl.col("retention")))
+    return pl.concat(
+        _course(c, {"override_rate": override_curve(episodes, c, blocks.starts)}, blocks.middles)
+        for c in conditions
+    )
 
 
-def _course(condition: str, curves: Mapping[str, np.ndarray]) -> pl.DataFrame:
+def _course(condition: str, curves: Mapping[str, np.ndarray], middles: np.ndarray) -> pl.DataFrame:
     columns: dict[str, Any] = {
         f"{name}_{part}": values
         for name, curve in curves.items()
         for part, values in zip(("mean", "low", "high"), curve, strict=True)
     }
-    length = len(next(iter(columns.values())))
-    numbers = pl.DataFrame({"episode": np.arange(1, length + 1), **columns}, nan_to_null=True)
+    numbers = pl.DataFrame({"episode": middles, **columns}, nan_to_null=True)
     return numbers.select(pl.lit(condition).alias("condition"), pl.all())
 
 
-def curves_figure(curves: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
-    """Return by episode with the assistant and, after each, without it.
+def curves_figure(
+    curves: pl.DataFrame, drawn: Mapping[str, Look], measure: str = "return"
+) -> Figure:
+    """A measure by episode with the assistant and, after each, without it.
 
     Args:
         curves: from `learning_curves`.
         drawn: looks of the assistants.
+        measure: the same as there; rates are drawn as percentages.
 
     Returns:
         The figure; bands are 95% intervals over trials, episodes of retention stand on grey.
     """
     with figure(10, 5.4) as drawing:
-        for axes, (column, title) in zip(drawing.subplots(1, 2), _PANELS.items(), strict=True):
-            _draw(axes, curves, column, drawn)
-            stretch(axes, "y")
-            axes.set(xlabel="episode", ylabel="return", title=title)
+        for axes, (side, title) in zip(drawing.subplots(1, 2), _PANELS.items(), strict=True):
+            if measure == "return":
+                _draw(axes, curves, f"{side}_return", drawn)
+                stretch(axes, "y")
+            else:
+                _draw(axes, _percentages(curves, f"{side}_{measure}"), f"{side}_{measure}", drawn)
+                axes.set(ylim=(-4, 104))
+            axes.set(xlabel="episode", ylabel=_UNITS[measure], title=title)
             retained = curves.filter("retention")["episode"]
             if len(retained):
-                span = retained.to_numpy()
-                axes.axvspan(span.min() - 0.5, span.max() + 0.5, color="#eeeeee", zorder=0)
+                last = curves.filter(~pl.col("retention"))["episode"].to_numpy().max()
+                first, end = retained.to_numpy().min(), retained.to_numpy().max()
+                axes.axvspan((last + first) / 2, end + 0.5, color="#eeeeee", zorder=0)
         _legend(drawing)
     return drawing
 
@@ -123,12 +173,15 @@ def courses_figure(courses: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
     """
     with figure(10, 4.4) as drawing:
         axes = drawing.subplots()
-        percentages = courses.with_columns(pl.selectors.starts_with("override_rate") * 100)
-        _draw(axes, percentages, "override_rate", drawn)
+        _draw(axes, _percentages(courses, "override_rate"), "override_rate", drawn)
         axes.set(xlabel="episode", ylabel="steps overridden, per cent")
         axes.set_ylim(bottom=min(0.0, *axes.get_ylim()))
         _legend(drawing)
     return drawing
+
+
+def _percentages(curves: pl.DataFrame, column: str) -> pl.DataFrame:
+    return curves.with_columns(pl.selectors.starts_with(column) * 100)
 
 
 def _draw(axes: Axes, curves: pl.DataFrame, column: str, drawn: Mapping[str, Look]) -> None:

@@ -81,22 +81,44 @@ def _places(rows: pl.DataFrame) -> np.ndarray:
     return rows.select("assisted_mean", "unassisted_mean").to_numpy()
 
 
-def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> None:
-    """Points with their intervals, rings around Pareto-optimal ones, and what they bound."""
+def draw_points(
+    axes: Axes,
+    rows: pl.DataFrame,
+    drawn: Mapping[str, Look],
+    size: float,
+    measures: tuple[str, str] = ("assisted", "unassisted"),
+    line: str = "",
+) -> None:
+    """A point with its intervals for each condition, assistant by assistant.
+
+    Args:
+        axes: to draw on.
+        rows: a row a condition: assistant, and mean, low and high of both measures.
+        drawn: looks of the assistants.
+        size: of markers, in points.
+        measures: to the right and upwards.
+        line: style of what joins the conditions of an assistant, in their order; none where empty.
+    """
     for part in rows.partition_by("assistant", maintain_order=True):
         name = str(part["assistant"][0])
-        centres = _places(part).T
-        margins = [
-            np.nan_to_num(
-                np.abs(part.select(f"{m}_low", f"{m}_high").cast(pl.Float64).to_numpy().T - centre)
-            )
-            for m, centre in zip(("assisted", "unassisted"), centres, strict=True)
+        ends = [
+            part.select(f"{measure}_{end}" for end in ("mean", "low", "high"))
+            .cast(pl.Float64)
+            .to_numpy()
+            .T
+            for measure in measures
         ]
+        margins = [np.nan_to_num(np.abs(e[1:] - e[0])) for e in ends]
         axes.errorbar(
-            *centres, xerr=margins[0], yerr=margins[1], fmt=content.looks[name].marker,
-            color=content.looks[name].colour, markersize=size, elinewidth=1, alpha=0.9,
-            label=NAMES.get(name, name),
+            ends[0][0], ends[1][0], xerr=margins[0], yerr=margins[1],
+            fmt=drawn[name].marker + line, color=drawn[name].colour, markersize=size,
+            elinewidth=1, linewidth=1.2, alpha=0.9, label=NAMES.get(name, name),
         )  # fmt: skip
+
+
+def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> None:
+    """Points with their intervals, rings around Pareto-optimal ones, and what they bound."""
+    draw_points(axes, rows, content.looks, size)
     axes.plot(*_places(rows.filter("pareto")).T, linestyle="none", markersize=2.1 * size, **_RING)
     for place, ink in _printed(rows, content):
         axes.plot(*place, markersize=17, markeredgewidth=1.6, color=ink, zorder=5, **_STAR)
@@ -191,12 +213,20 @@ def _label(
             )  # fmt: skip
 
 
+def _thinned(rows: pl.DataFrame) -> pl.DataFrame:
+    """So many conditions as there is room to label: Pareto-optimal ones, and evenly spread ones."""
+    best, others = rows.filter("pareto").head(MOST_IN_A_COLUMN), rows.filter(~pl.col("pareto"))
+    room = min(MOST_IN_A_COLUMN - best.height, others.height)
+    spread = np.linspace(0, others.height - 1, room).round().astype(int)
+    return pl.concat([best, others[spread.tolist()]])
+
+
 def _enlarge(axes: Axes, rows: pl.DataFrame, content: _Content) -> None:
     """Look closely at a cluster; labels stand beside it, of Pareto-optimal conditions first."""
     name = str(rows["assistant"][0])
     (low, high), heights = _limits(rows, content._replace(published=()))
     axes.set(xlim=(low, high + 0.6 * (high - low)), ylim=heights)
-    chosen = rows.sort("pareto", descending=True, maintain_order=True).head(MOST_IN_A_COLUMN)
+    chosen = _thinned(rows)
     labels = [_name(str(condition)) for condition in chosen["condition"]]
     label_in_column(axes, _places(chosen), labels, at=0.78, ink=content.looks[name].colour)
     axes.set(title=NAMES.get(name, name))

@@ -118,7 +118,7 @@ def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
         (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
     )
     low, high = along.get_view_interval()
-    limit = 1000 if axis == "x" else 300
+    limit = 1000 if axis == "x" else 600
     if low >= -limit and high <= limit:
         return
     set_scale("symlog", linthresh=100, linscale=1.2)

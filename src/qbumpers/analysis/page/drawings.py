@@ -8,13 +8,24 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from qbumpers.analysis.figures import curves, frontier, heatmaps, rows, sensitivity, thresholds
+from qbumpers.analysis.claims import telling
+from qbumpers.analysis.figures import (
+    curves,
+    frontier,
+    heatmaps,
+    rows,
+    sensitivity,
+    thresholds,
+    tradeoffs,
+)
 from qbumpers.analysis.figures.style import Look, looks
 from qbumpers.analysis.findings import Findings, LearnerFindings
 from qbumpers.analysis.published import published_numbers
 from qbumpers.analysis.section_4_1 import KINDS, Move, cells, overridden, suboptimal_moves
+from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.store import Results
 from qbumpers.tasks.cliff_walking import ACTION_NAMES, state_of
+from qbumpers.values import TabularValues
 
 SHOWN_THRESHOLDS = (0.5, 0.499, 0.0195, 0.018)
 """Before and after each change of behaviour."""
@@ -55,12 +66,18 @@ def drawings(results: Results, findings: Findings, thresholding: bool) -> list[D
         The figures, learner by learner.
     """
     drawn = looks(findings.summary["assistant"])
-    found = [each for about in findings.learners for each in _of_learner(results, about, drawn)]
-    return [*found, *_of_thresholds(results.values.table)] if thresholding else found
+    claims = bool(findings.claims)
+    found = [
+        each for about in findings.learners for each in _of_learner(results, about, drawn, claims)
+    ]
+    values = results.values
+    if thresholding and isinstance(values, TabularValues):
+        found += _of_thresholds(values.table)
+    return found
 
 
 def _of_learner(
-    results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
+    results: Results, about: LearnerFindings, drawn: Mapping[str, Look], claims: bool
 ) -> Iterator[Drawing]:
     """What compares the conditions of one learner."""
     make = partial(_drawing, about.label)
@@ -73,6 +90,16 @@ def _of_learner(
         about.frontier,
         partial(frontier.frontier_figure, drawn=drawn, published=printed),
     )
+    known = tradeoffs.tradeoffs(about.summary)
+    if known.height:
+        yield make(
+            "tradeoffs",
+            "Returns, successes and crashes without the assistant against those with it. Lines "
+            "join the settings of a method, a few of which are labelled with α; bars are 95% "
+            "intervals.",
+            known,
+            partial(tradeoffs.tradeoffs_figure, drawn=drawn),
+        )
     if about.differences.height:
         yield make(
             "differences-from-none",
@@ -81,33 +108,44 @@ def _of_learner(
             about.differences.filter(pl.col("condition").is_in(_legible(about.summary))),
             partial(rows.differences_figure, drawn=drawn),
         )
-    yield from _of_courses(results, about, drawn)
+    yield from _of_courses(results, about, drawn, claims)
     yield from _of_options(results, about, drawn)
 
 
 def _of_courses(
-    results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
+    results: Results, about: LearnerFindings, drawn: Mapping[str, Look], claims: bool
 ) -> Iterator[Drawing]:
+    """What happened in the course of training."""
     make = partial(_drawing, about.label)
     chosen = curves.representative(about.summary)
+    shown = telling(about.trials) if claims else chosen
+    end = _smoothed(results.experiment) + ", with 95% bands over trials; a few conditions."
+    end += " Grey: the assistant is gone." * (results.experiment.retention > 0)
     yield make(
         "learning-curves",
-        "Mean return by episode, with 95% bands over trials; a few conditions of each assistant."
-        + " Grey: the assistant is gone." * (results.experiment.retention > 0),
-        curves.learning_curves(results.episodes, chosen),
+        f"Mean return {end}",
+        curves.learning_curves(results.episodes, shown),
         partial(curves.curves_figure, drawn=drawn),
     )
+    if claims:
+        yield make(
+            "success-curves",
+            f"Success rate {end}",
+            curves.learning_curves(results.episodes, shown, "success"),
+            partial(curves.curves_figure, drawn=drawn, measure="success"),
+        )
     helped = about.summary.filter(
         pl.col("condition").is_in(chosen) & (pl.col("overrides_mean") > 0)
     )
     if helped.height:
         yield make(
             "override-course",
-            "Share of steps overridden in each episode of training, with 95% bands over trials.",
+            f"Share of steps overridden in training {_smoothed(results.experiment)}, with 95% "
+            "bands over trials.",
             curves.override_courses(results.episodes, helped["condition"].to_list()),
             partial(curves.courses_figure, drawn=drawn),
         )
-    if results.states["row"].null_count() == 0:
+    if results.states is not None and results.states["row"].null_count() == 0:
         episodes = results.experiment.trials * results.experiment.episodes
         yield make(
             "heatmaps",
@@ -116,6 +154,11 @@ def _of_courses(
             heatmaps.cell_counts(results.states, chosen, episodes),
             heatmaps.heatmap_figure,
         )
+
+
+def _smoothed(experiment: Experiment) -> str:
+    size = curves.block_size(experiment.episodes)
+    return "by episode" if size == 1 else f"by episode, averaged over blocks of {size}"
 
 
 def _of_options(

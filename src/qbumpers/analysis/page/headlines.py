@@ -6,6 +6,7 @@ from typing import Any
 
 import polars as pl
 
+from qbumpers.analysis.claims import Claim
 from qbumpers.analysis.figures.style import NAMES, readable, setting
 from qbumpers.analysis.findings import Findings, LearnerFindings
 from qbumpers.analysis.frontier import Regret
@@ -26,10 +27,26 @@ def headlines(findings: Findings) -> list[str]:
         Sentences; those on one of several learners begin with what tells it from the others.
     """
     return [
-        f"With {about.label}: {sentence}" if about.label else sentence
-        for about in findings.learners
-        for sentence in _about(about)
+        *(f"The paper's claim that {told(claim)}" for claim in findings.claims),
+        *(
+            f"With {about.label}: {sentence}" if about.label else sentence
+            for about in findings.learners
+            for sentence in _about(about)
+        ),
     ]
+
+
+def told(claim: Claim) -> str:
+    """A claim and what came of it; of one about settings, how many speak for it and against it."""
+    verdicts = list(claim.settings.values())
+    if not claim.about_settings:
+        return f"{claim.title}: {claim.verdict}."
+    counts = (
+        f"of {len(verdicts)} setting{'s' * (len(verdicts) != 1)} tried, "
+        f"{verdicts.count(True)} for it, "
+        f"{verdicts.count(False)} against it"
+    )
+    return f"{claim.title}: {claim.verdict} ({counts})."
 
 
 def _about(about: LearnerFindings) -> Iterator[str]:
@@ -105,7 +122,7 @@ def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
         return f"At matched {matched}, {theirs} is itself the best: it leaves no regret to reduce."
     compared = {"performance": "learning", "learning": "performance"}[matched]
     amount = f"{abs(100 * reduction.mean):.0f}% {'less' if reduction.mean >= 0 else 'more'}"
-    interval = "too few trials for an interval"
+    interval = "its interval is not known"
     if not isnan(reduction.low):
         ends = f"{per_cent(reduction.low)} to {per_cent(reduction.high)}"
         interval = f"95% interval of the reduction {ends}"

@@ -2,7 +2,6 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,9 +13,10 @@ from qbumpers.analysis.figures.style import NAMES
 from qbumpers.analysis.findings import Findings
 from qbumpers.analysis.numerals import written
 from qbumpers.analysis.page import tables as page_tables
+from qbumpers.analysis.page.evidence import claim_table
 from qbumpers.analysis.section_4_1 import ThresholdStory
 from qbumpers.experiments.design import Experiment, reproductions
-from qbumpers.experiments.sources import PROFILES, reproduction
+from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experiments.store import EXPERIMENT, Results, run_description
 
 
@@ -61,21 +61,14 @@ def page(
     Returns:
         HTML.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("qbumpers.analysis.page"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {"number": written}
     settings = (folder / EXPERIMENT).read_text(encoding="utf-8")
     files = {name: _data("text/csv", table.write_csv().encode()) for name, table in tables.items()}
-    return environment.get_template("report.html.j2").render(
+    return _template().render(
         experiment=results.experiment,
         findings=findings,
         story=story,
         make=page_tables,
+        claim_table=claim_table,
         names=NAMES,
         kinds={picture.kind for picture in pictures},
         pictures=pictures,
@@ -87,9 +80,22 @@ def page(
     )
 
 
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("qbumpers.analysis.page"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"number": written}
+    return environment.get_template("report.html.j2")
+
+
 def command(experiment: Experiment) -> str:
     """What to type to repeat an experiment."""
-    for name, profile in product(reproductions(), PROFILES):
+    known = [(name, profile) for name in reproductions() for profile in profiles(name)]
+    for name, profile in known:
         repeated = reproduction(name, profile, trials=experiment.trials, seed=experiment.seed)
         if repeated == experiment:
             size = f"--trials {experiment.trials} --seed {experiment.seed}"

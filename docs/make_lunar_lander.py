@@ -1,0 +1,129 @@
+"""Write the page on Lunar Lander from kept results: `python docs/make_lunar_lander.py`.
+
+With `--keep` it first keeps those of a finished run of `qbumpers reproduce lunar-lander`.
+"""
+
+import argparse
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import polars as pl
+import tomli_w
+from make_pictures import keep as keep_picture
+from writing import DOCS, measure, template
+
+from qbumpers.analysis.claims import Claim, judged
+from qbumpers.analysis.figures.curves import block_size, courses_figure, curves_figure
+from qbumpers.analysis.figures.runs import run_means, runs_figure
+from qbumpers.analysis.figures.sensitivity import sensitivities, sensitivity_figure
+from qbumpers.analysis.figures.style import NAMES, looks
+from qbumpers.analysis.figures.tradeoffs import tradeoffs, tradeoffs_figure
+from qbumpers.analysis.findings import find_tables
+from qbumpers.analysis.keeping import RUNS, Kept, keep, keep_runs, read_kept, read_trials
+from qbumpers.analysis.page.headlines import told
+
+ABOUT = "about.toml"
+DEFAULT = "default"
+"""What a person adds to kept results: hours and machine; and what their run is called."""
+
+
+class Runs(NamedTuple):
+    """Runs that differ from the default in one thing each.
+
+    Attributes:
+        means: a row a run and condition.
+        cells: its rows by run and condition.
+        claims: the paper's claims by run, judged from its trials.
+    """
+
+    means: pl.DataFrame
+    cells: dict[tuple[str, str], dict[str, Any]]
+    claims: dict[str, list[Claim]]
+
+
+def make(data: Path, folder: Path) -> None:
+    """Write `lunar-lander.md` and its images into `folder`, from what was kept in `data`."""
+    images = folder / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    kept = read_kept(data)
+    findings = find_tables(kept.trials, kept.experiment)
+    draw(kept, findings.summary, images)
+    runs = compared_runs(kept, data / RUNS)
+    if runs is not None:
+        keep_picture(runs_figure(runs.means, looks(NAMES)), images, "lunar-lander-runs")
+    text = template("lunar-lander.md.j2").render(
+        experiment=kept.experiment,
+        run=kept.run,
+        about=about(data / ABOUT),
+        block=block_size(kept.experiment.episodes),
+        findings=findings,
+        runs=runs,
+        told=told,
+        measure=measure,
+    )
+    (folder / "lunar-lander.md").write_text(text, encoding="utf-8")
+
+
+def draw(kept: Kept, summary: pl.DataFrame, images: Path) -> None:
+    """Every figure of the main run."""
+    drawn = looks(NAMES)
+    helped = kept.overrides.filter(pl.col("override_rate_mean").max().over("condition") > 0)
+    for name, figure in {
+        "figure4": tradeoffs_figure(tradeoffs(summary), drawn),
+        "learning": curves_figure(kept.curves, drawn),
+        "success": curves_figure(kept.curves, drawn, "success"),
+        "overrides": courses_figure(helped, drawn),
+        "settings": sensitivity_figure(sensitivities(summary, ["alpha"]), drawn),
+    }.items():
+        keep_picture(figure, images, f"lunar-lander-{name}")
+
+
+def compared_runs(kept: Kept, path: Path) -> Runs | None:
+    """The kept runs beside the conditions of the main run that they have too; None without any."""
+    if not path.is_file():
+        return None
+    trials = read_trials(path)
+    conditions = trials["condition"].unique(maintain_order=True).to_list()
+    own = kept.trials.filter(pl.col("condition").is_in(conditions))
+    own = own.select(pl.lit(DEFAULT).alias("run"), pl.all())
+    together = pl.concat([own, trials.filter(pl.col("run") != DEFAULT)])
+    claims = {
+        str(part["run"][0]): judged(
+            "lunar-lander", part.drop("run"), np.random.default_rng(kept.experiment.seed)
+        )
+        for part in together.partition_by("run", maintain_order=True)
+    }
+    means = run_means(together)
+    cells = {(row["run"], row["condition"]): row for row in means.iter_rows(named=True)}
+    return Runs(means, cells, claims)
+
+
+def about(path: Path) -> dict[str, Any]:
+    """What a person noted of the run; nothing where there is no note."""
+    return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def main() -> None:
+    """Keep what is to be kept, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path, default=DOCS, help="for the page")
+    parser.add_argument("--data", type=Path, default=DOCS / "data" / "lunar-lander")
+    parser.add_argument("--keep", type=Path, help="folder of the finished run, to be kept first")
+    parser.add_argument("--hours", type=float, help="that the run took, to be told")
+    parser.add_argument("--machine", help="that it ran on, to be told, such as 'two cores'")
+    parser.add_argument("--runs", nargs="+", metavar="NAME=FOLDER", help="runs to be kept beside")
+    asked = parser.parse_args()
+    if asked.keep:
+        keep(asked.keep, asked.data)
+        noted = {"hours": asked.hours, "machine": asked.machine}
+        noted = {name: value for name, value in noted.items() if value is not None}
+        (asked.data / ABOUT).write_text(tomli_w.dumps(noted), encoding="utf-8")
+    if asked.runs:
+        keep_runs(dict(run.rsplit("=", 1) for run in asked.runs), asked.data)
+    make(asked.data, asked.folder)
+
+
+if __name__ == "__main__":
+    main()
