@@ -4,6 +4,7 @@ import os
 import platform
 
 import cluster
+import deep
 import lander
 import shared_control
 import simulation
@@ -11,15 +12,13 @@ import sweeps
 import whole_processes
 from measuring import is_quick, show
 
+BENCHMARKS = (simulation, shared_control, lander, deep, sweeps, cluster, whole_processes)
+
 
 def main() -> None:
     quick = is_quick(__doc__)
     load = os.getloadavg()[0]
-    rows = [
-        row
-        for benchmark in (simulation, shared_control, lander, sweeps, cluster, whole_processes)
-        for row in benchmark.measure(quick)
-    ]
+    rows = [row for benchmark in BENCHMARKS for row in benchmark.measure(quick)]
     machine = f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} when begun"
     show(f"Medians of alternated rounds ({machine})", rows)
 

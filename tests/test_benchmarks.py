@@ -86,6 +86,7 @@ def test_all_benchmarks_are_run_by_one_script():
         ("simulation.py", ["one core", "none", "maximal", "two workers"]),
         ("shared_control.py", ["none", "maximal", "local-q-thresholding", "stochastic-q-bumpers"]),
         ("lander.py", ["random actions", "landing", "reset"]),
+        ("deep.py", ["training step", "faster than plain PyTorch", "SB3", "two processes"]),
         ("sweeps.py", ["of the engine", "efficiency", "threads"]),
         ("cluster.py", ["a small cell, Ray, alone", "in batches", "Ray on"]),
         ("whole_processes.py", ["import qbumpers", "Figure 2 grid, 26 conditions", "reproduce"]),

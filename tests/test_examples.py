@@ -8,12 +8,20 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
-NEEDED = {"train_inside_with_stable_baselines3.py": "stable_baselines3"}
+NEEDED = {
+    "lunar_lander.py": "Box2D",
+    "train_inside_with_stable_baselines3.py": "stable_baselines3",
+}
 PRINTED = {
+    "lunar_lander.py": (
+        r"alone: crashed after \d+ steps, return -\d+\.\d, 0 overrides; see \S+\.gif\n"
+        r"bumpers: \w+ after \d+ steps, return -?\d+\.\d, \d+ overrides; see \S+\.gif\n"
+        r"maximal: landed after \d+ steps, return \d+\.\d, \d+ overrides; see \S+\.gif\n"
+    ),
     "train_inside_with_stable_baselines3.py": (
         r"before training: mean return -?\d+\.\d, \d+\.\d overrides an episode\n"
         r"after training: mean return -?\d+\.\d, \d+\.\d overrides an episode\n"
-    )
+    ),
 }
 
 

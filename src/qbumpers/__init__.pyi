@@ -2,17 +2,29 @@ from .assistants import Assistant, make_assistant, register_assistant
 from .decisions import Decision, Noise, Situation, Step
 from .errors import RequestError
 from .experiments.store import load
-from .learners import QLearner, Schedule
+from .learners import DoubleDQN, Network, QLearner, Schedule
 from .shared_control import SharedControl
 from .simulation import Simulation, simulate
-from .tasks import TabularTask, make_task, register_task
-from .values import QValues, TabularValues, learn_values, load_values, solve
+from .tasks import TabularTask, VectorTask, make_task, register_task
+from .values import (
+    NetworkValues,
+    QValues,
+    TabularValues,
+    learn_values,
+    load_values,
+    shipped_expert,
+    solve,
+    train_expert,
+)
 
 __version__: str
 
 __all__ = [
     "Assistant",
     "Decision",
+    "DoubleDQN",
+    "Network",
+    "NetworkValues",
     "Noise",
     "QLearner",
     "QValues",
@@ -24,6 +36,7 @@ __all__ = [
     "Step",
     "TabularTask",
     "TabularValues",
+    "VectorTask",
     "__version__",
     "learn_values",
     "load",
@@ -32,6 +45,8 @@ __all__ = [
     "make_task",
     "register_assistant",
     "register_task",
+    "shipped_expert",
     "simulate",
     "solve",
+    "train_expert",
 ]
