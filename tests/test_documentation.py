@@ -55,7 +55,7 @@ def show_warning(message, category, *_):
 def next_block():
     print({_MARK!r}, flush=True)
 
-def run(*command):
+def _run_command(*command):
     subprocess.run([sys.executable, "-m", *command], check=True, stderr=subprocess.STDOUT)
 
 warnings.showwarning = show_warning
@@ -93,7 +93,7 @@ def script_of(blocks):
         if block.language == "python":
             parts.append(block.text)
         elif block.language == "sh":
-            parts += [f"run(*{c!r})" for c in commands_of([block]) if is_run(c)]
+            parts += [f"_run_command(*{c!r})" for c in commands_of([block]) if is_run(c)]
         elif named := _NAMED_TOML.match(block.text):
             parts.append(f"Path({named[1]!r}).write_text({block.text!r}, encoding='utf-8')")
     return "\n".join(parts)
