@@ -5,7 +5,7 @@ import pytest
 from qbumpers import load_values, solve
 from qbumpers.cli import expert as command
 from qbumpers.tasks import make_task
-from qbumpers.values import TabularValues
+from qbumpers.values import TabularValues, evaluation, visiting
 from tests.values.networks import constant, network_of
 
 POLE = ("CartPole-v1", "--discount", "0.9")
@@ -68,6 +68,18 @@ def test_a_file_is_checked_and_drawn(call, pole, tmp_path):
     }  # fmt: skip
 
 
+def test_values_are_corrected_into_another_file(call, pole, monkeypatch):
+    monkeypatch.setattr(visiting, "_EPISODES", 10)
+    monkeypatch.setattr(evaluation, "_UPDATES", 300)
+    monkeypatch.setattr(evaluation, "BRANCHES", 60)
+    status, output, _ = call("expert", *POLE, "--check", "pole.npz", "--corrected", "mended.npz")
+    assert status == 0
+    assert "In states held out the error was" in output
+    mended = load_values("mended.npz")
+    assert "each state corrected by" in mended.method
+    assert load_values("pole.npz").digest() == pole.digest() != mended.digest()
+
+
 def test_an_expert_worse_than_random_is_warned_of(call):
     constant(0, 4, 2, task="CartPole-v1").save("fall.npz")
     status, _, errors = call("expert", *POLE, "--check", "fall.npz")
@@ -90,6 +102,7 @@ def test_an_expert_worse_than_random_is_warned_of(call):
         (("Acrobot-v1", "--discount", "0.9", "--check", "pole.npz"), "of task CartPole-v1, 4"),
         (("cliff-walking", "--figures", "d", "--check", "pole.npz"), "a table needs none"),
         (("cliff-walking", "--check", "pole.npz"), "pole.npz: a network"),
+        (("cliff-walking", "--corrected", "mended.npz"), "the values of a table are exact"),
         ((*POLE, "--check", "table.npz"), "table.npz: a table"),
         (("Pendulum-v1", "--discount", "0.9"), "numbered actions"),
     ],

@@ -38,6 +38,13 @@ def expert(
         Path | None,
         typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE"),
     ] = None,
+    corrected: Annotated[
+        Path | None,
+        typer.Option(
+            help="Also correct the values by what they achieve where learners go, into this file.",
+            metavar="FILE",
+        ),
+    ] = None,
     discount: Annotated[
         float | None,
         typer.Option(help="Of a Gymnasium environment, which states none.", metavar="NUMBER"),
@@ -73,12 +80,17 @@ def expert(
     path = out or Path(f"{task.replace('/', '-')}.npz")
     with stoppable():
         if isinstance(made, TabularTask):
+            if corrected is not None:
+                raise RequestError(f"--corrected {corrected}: the values of a table are exact")
             _expert_of_table(made, check, figures, path)
-        elif check is not None:
+            return
+        if check is not None:
             _check(made, check, figures)
         else:
             recipe = _recipe(made, steps, activation, hidden, learning_rate, opening)
             _train(made, recipe, list(range(seeds)), path)
+        if corrected is not None:
+            _correct(made, check or path, corrected)
 
 
 def _recipe(
@@ -106,16 +118,12 @@ def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -
     from qbumpers.values.selection import best, judge, train_several, with_record
 
     work = path.with_name(f"{path.name}.work")
-    columns = (
-        TextColumn("{task.description}"), BarColumn(),
-        TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps"), TimeRemainingColumn(),
-    )  # fmt: skip
-    with Progress(*columns, console=OUTPUT) as bar:
+    with _steps_bar() as bar:
         shown = bar.add_task("training", total=recipe.steps * len(seeds))
 
         def report(seed: int, steps: int) -> None:
             done = seeds.index(seed) * recipe.steps + steps
-            bar.update(shown, completed=done, description=f"seed {seed}")
+            bar.update(shown, completed=done, description=f"steps, seed {seed}")
 
         trained = train_several(task, recipe, seeds, work, report)
     with OUTPUT.status("judging"):
@@ -130,6 +138,12 @@ def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -
         f"{escape(str(work))}",
         soft_wrap=True,
     )
+
+
+def _steps_bar() -> Progress:
+    count = TextColumn("{task.completed:,.0f} of {task.total:,.0f}")
+    columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
+    return Progress(*columns, console=OUTPUT)
 
 
 def _warn(task: "VectorTask", values: "NetworkValues") -> None:
@@ -193,6 +207,27 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
         )
     if figures is not None:
         _draw(claims, path, figures)
+
+
+def _correct(task: "VectorTask", path: Path, out: Path) -> None:
+    from qbumpers.values import evaluation
+
+    values = _network_of(task, path)
+    with _steps_bar() as bar:
+        shown = bar.add_task("trying actions where learners go", total=evaluation.BRANCHES)
+        found = evaluation.evaluated(
+            task,
+            values,
+            branches=evaluation.BRANCHES,
+            report=lambda done: bar.update(shown, completed=done),
+        )
+    found.values.save(out)
+    OUTPUT.print(
+        f"- In states held out the error was {_with_error(found.before.absolute)} in size, now "
+        f"{_with_error(found.after.absolute)}; its mean was {_signed(found.before.bias)}, now "
+        f"{_signed(found.after.bias)}.\nCorrected values: [bold]{escape(str(out))}[/bold]",
+        soft_wrap=True,
+    )
 
 
 def _network_of(task: "VectorTask", path: Path) -> "NetworkValues":

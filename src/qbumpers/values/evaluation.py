@@ -25,6 +25,9 @@ from qbumpers.values.network import NetworkValues
 from qbumpers.values.quality import returns_to_go
 from qbumpers.values.visiting import visit
 
+BRANCHES = 6_000
+"""States in which an action is tried, unless another number is asked for."""
+
 _KEPT = 8  # greedy steps of a branch that are fitted too
 _HELD_OUT = 5  # every fifth episode
 _RATES = (1e-3, 3e-4, 1e-4)  # of learning, one after another
@@ -80,7 +83,7 @@ def evaluated(
     task: VectorTask,
     values: NetworkValues,
     *,
-    branches: int = 6_000,
+    branches: int = BRANCHES,
     learners: int = 4,
     seed: int = 0,
     report: Callable[[int], None] = lambda branches: None,
