@@ -6,7 +6,9 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from qbumpers import compilation
@@ -133,3 +135,28 @@ def test_the_stamp_covers_every_source_that_is_compiled(tmp_path):
         before = stamp(copy)
         source.write_text(source.read_text() + "\n# changed\n")
         assert stamp(copy) != before, source.name
+
+
+class Pair(NamedTuple):
+    first: int
+    second: float
+
+
+@compilation.compiled_for_session
+def _weigh(numbers, pair, nested):
+    return numbers.sum() * pair.second + pair.first + nested[0][1]
+
+
+def test_entered_code_gives_what_the_function_gives_and_compiles_once():
+    examples = (np.zeros(2), Pair(0, 0.0), ((0, 0.0), 1))
+    entry = compilation.entered(_weigh, *examples)
+    assert len(_weigh.signatures) == 1
+    arguments = (np.array([1.5, 2.0, 4.0]), Pair(3, 0.25), ((7, 0.125), 9))
+    assert entry(*arguments) == _weigh(*arguments) == 7.5 * 0.25 + 3 + 0.125
+    compilation.entered(_weigh, *examples)
+    assert len(_weigh.signatures) == 1
+
+
+def test_a_function_that_is_not_compiled_is_entered_as_it_is():
+    plain = compilation.uncompiled(_weigh)
+    assert compilation.entered(plain, np.zeros(2)) is plain
