@@ -26,7 +26,7 @@ from qbumpers.analysis.page.headlines import told
 
 ABOUT = "about.toml"
 DEFAULT = "default"
-"""What a person adds to kept results: hours and machine; and what their run is called."""
+"""What a person adds to kept results: hours, machine, a note; and what their run is called."""
 
 
 class Runs(NamedTuple):
@@ -113,11 +113,12 @@ def main() -> None:
     parser.add_argument("--keep", type=Path, help="folder of the finished run, to be kept first")
     parser.add_argument("--hours", type=float, help="that the run took, to be told")
     parser.add_argument("--machine", help="that it ran on, to be told, such as 'two cores'")
+    parser.add_argument("--note", help="a sentence on the run, to be told")
     parser.add_argument("--runs", nargs="+", metavar="NAME=FOLDER", help="runs to be kept beside")
     asked = parser.parse_args()
     if asked.keep:
         keep(asked.keep, asked.data)
-        noted = {"hours": asked.hours, "machine": asked.machine}
+        noted = {"hours": asked.hours, "machine": asked.machine, "note": asked.note}
         noted = {name: value for name, value in noted.items() if value is not None}
         (asked.data / ABOUT).write_text(tomli_w.dumps(noted), encoding="utf-8")
     if asked.runs:

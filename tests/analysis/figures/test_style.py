@@ -95,9 +95,9 @@ def test_the_learner_is_left_out_of_a_conditions_name():
     assert assistant_of("none@penalty=2") == "none"
 
 
-@pytest.mark.parametrize(("axis", "limit"), [("x", 1000), ("y", 600)])
-def test_only_returns_of_very_different_size_are_stretched(axis, limit):
-    for deepest, scale in ((-0.9 * limit, "linear"), (-1.1 * limit, "symlog")):
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_only_returns_of_very_different_size_are_stretched(axis):
+    for deepest, scale in ((-900, "linear"), (-1100, "symlog")):
         with figure(4, 3) as drawing:
             axes = drawing.subplots()
             axes.plot([0, deepest], [0, deepest])

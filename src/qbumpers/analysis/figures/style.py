@@ -107,6 +107,9 @@ def setting(condition: str) -> str:
     return options.replace("alpha=", "α = ").replace(",", ", ")
 
 
+_FAR = 1000  # beyond it what lies near zero could not be told apart
+
+
 def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
     """Show returns of very different size: linear within -100..100, logarithmic beyond.
 
@@ -118,8 +121,7 @@ def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
         (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
     )
     low, high = along.get_view_interval()
-    limit = 1000 if axis == "x" else 600
-    if low >= -limit and high <= limit:
+    if low >= -_FAR and high <= _FAR:
         return
     set_scale("symlog", linthresh=100, linscale=1.2)
     steps = (1,) if axis == "x" else (1, 3)  # numbers side by side need more room
