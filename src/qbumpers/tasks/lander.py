@@ -4,9 +4,11 @@ Box2D moves the bodies; what Gymnasium computes around it in Python is compiled 
 drawn ahead, once, since every episode has the same.
 """
 
+import functools
 import math
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium.utils import seeding
 
@@ -31,9 +33,12 @@ from qbumpers.tasks.lander_bodies import (
     build,
     motion_of,
 )
+from qbumpers.tasks.vector import VectorTask
 
 ACTIONS = 4
 OBSERVATION_SIZE = 8
+DISCOUNT = 0.99
+EPISODE_LIMIT = 1000
 
 _PAPER_SEED = [547404849, 309914516]
 _STEPS_A_SECOND = 50
@@ -143,6 +148,34 @@ class Lander:
     def _draw_ahead(self) -> None:
         drawn = self._chance.uniform(-1.0, 1.0, size=(_DRAWN, 2)) / SCALE
         self._dispersions = np.concatenate([self._dispersions, drawn])
+
+
+def lunar_lander(seed: int | None = None) -> VectorTask:
+    """The task, without chance: every episode has the same terrain and noise.
+
+    Args:
+        seed: of Gymnasium's class, at every reset; None for the paper's terrain and noise.
+
+    Returns:
+        The task; coming to rest is its success, touching the ground with the hull or leaving the
+        picture its crash.
+
+    Raises:
+        RequestError: where the seed is not a whole number, or negative.
+    """
+    chance_of(seed)
+    return VectorTask(
+        name="lunar-lander",
+        make_stepper=functools.partial(Lander, seed),
+        make_environment=functools.partial(gymnasium.make, "qbumpers/LunarLander-v0", seed=seed),
+        observation_size=OBSERVATION_SIZE,
+        actions=ACTIONS,
+        discount=DISCOUNT,
+        episode_limit=EPISODE_LIMIT,
+        settings={"seed": seed},
+        has_success=True,
+        has_crash=True,
+    )
 
 
 @compiled

@@ -1,6 +1,5 @@
 """Lunar Lander with the same terrain and noise in every episode (Section 4.3)."""
 
-import functools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -9,13 +8,9 @@ import gymnasium
 import numpy as np
 
 # First, for its message where Box2D is missing.
-from qbumpers.tasks.lander import ACTIONS, OBSERVATION_SIZE, Lander, chance_of
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.lander import chance_of
 
 from gymnasium.envs.box2d import lunar_lander as original  # isort: skip
-
-DISCOUNT = 0.99
-EPISODE_LIMIT = 1000
 
 
 class LunarLander(original.LunarLander):
@@ -72,31 +67,3 @@ class LunarLander(original.LunarLander):
             yield
         finally:
             self._np_random = seeded
-
-
-def lunar_lander(seed: int | None = None) -> VectorTask:
-    """The task, without chance: every episode has the same terrain and noise.
-
-    Args:
-        seed: of Gymnasium's class, at every reset; None for the paper's terrain and noise.
-
-    Returns:
-        The task; coming to rest is its success, touching the ground with the hull or leaving the
-        picture its crash.
-
-    Raises:
-        RequestError: where the seed is not a whole number, or negative.
-    """
-    chance_of(seed)
-    return VectorTask(
-        name="lunar-lander",
-        make_stepper=functools.partial(Lander, seed),
-        make_environment=functools.partial(gymnasium.make, "qbumpers/LunarLander-v0", seed=seed),
-        observation_size=OBSERVATION_SIZE,
-        actions=ACTIONS,
-        discount=DISCOUNT,
-        episode_limit=EPISODE_LIMIT,
-        settings={"seed": seed},
-        has_success=True,
-        has_crash=True,
-    )
