@@ -24,6 +24,8 @@ from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.keeping import RUNS, Kept, keep, keep_runs, read_kept, read_trials
 from qbumpers.analysis.page.headlines import told
 
+_COLOURS = 48  # bands that overlap make many, and large files
+
 ABOUT = "about.toml"
 DEFAULT = "default"
 """What a person adds to kept results: hours, machine, a note; and what their run is called."""
@@ -52,7 +54,7 @@ def make(data: Path, folder: Path) -> None:
     draw(kept, findings.summary, images)
     runs = compared_runs(kept, data / RUNS)
     if runs is not None:
-        keep_picture(runs_figure(runs.means, looks(NAMES)), images, "lunar-lander-runs")
+        keep_picture(runs_figure(runs.means, looks(NAMES)), images, "lunar-lander-runs", _COLOURS)
     text = template("lunar-lander.md.j2").render(
         experiment=kept.experiment,
         run=kept.run,
@@ -77,7 +79,7 @@ def draw(kept: Kept, summary: pl.DataFrame, images: Path) -> None:
         "overrides": courses_figure(helped, drawn),
         "settings": sensitivity_figure(sensitivities(summary, ["alpha"]), drawn),
     }.items():
-        keep_picture(figure, images, f"lunar-lander-{name}")
+        keep_picture(figure, images, f"lunar-lander-{name}", _COLOURS)
 
 
 def compared_runs(kept: Kept, path: Path) -> Runs | None:

@@ -36,17 +36,17 @@ def make(folder: Path) -> None:
     keep(belief_picture(), images, "belief")
 
 
-def keep(drawing: Figure, images: Path, name: str) -> None:
-    """Save a figure as a small PNG."""
+def keep(drawing: Figure, images: Path, name: str, colours: int = 128) -> None:
+    """Save a figure as a small PNG of so many colours."""
     path = save(drawing, images, name)
     path.with_suffix(".svg").unlink()
-    shrink(path)
+    shrink(path, colours)
 
 
-def shrink(path: Path) -> None:
-    """Reduce a PNG to 128 colours, a third of its size."""
+def shrink(path: Path, colours: int = 128) -> None:
+    """Reduce a PNG to a few colours, a third of its size."""
     with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(128, dither=Image.Dither.NONE)
+        small = picture.convert("RGB").quantize(colours, dither=Image.Dither.NONE)
     small.save(path, optimize=True)
 
 
