@@ -15,10 +15,10 @@ from qbumpers.learners.double_dqn import make_brain, rates
 from qbumpers.learners.q_learning import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw
 from qbumpers.simulation.condition import Condition, outcome_room, streams
-from qbumpers.simulation.deep_steps import START_VALUE, act, finite, prefer, take
+from qbumpers.simulation.deep_steps import START_VALUE, act, prefer, take
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, Steps
 from qbumpers.tasks import VectorTask
-from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED
+from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED, finite
 
 _ENDED = TERMINATED | TRUNCATED
 

@@ -16,7 +16,7 @@ from qbumpers.learners.network import Layout, values_of
 from qbumpers.learners.perception import Perception, perceive
 from qbumpers.learners.q_learning import choose, choose_greedily
 from qbumpers.random_streams import ASSISTANT, LEARNER, draw
-from qbumpers.tasks.dynamics import TERMINATED
+from qbumpers.tasks.dynamics import TERMINATED, finite
 
 EARNED, DISCOUNT, START_VALUE = range(3)
 """Places in the account of an episode."""
@@ -120,12 +120,3 @@ def take(
     account[EARNED] += account[DISCOUNT] * reward
     account[DISCOUNT] *= gamma
     return experience.action, projected, memory, True
-
-
-@compiled_apart
-def finite(reward: float, observation: np.ndarray) -> bool:
-    """Whether a reward and every number of an observation [D] are finite."""
-    found = np.isfinite(reward)
-    for i in range(len(observation)):
-        found = found and np.isfinite(observation[i])
-    return found

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 
-from qbumpers.compilation import INLINE
+from qbumpers.compilation import INLINE, compiled_apart
 
 TERMINATED, SUCCESS, CRASH, TRUNCATED = 1, 2, 4, 8
 """Bits of the events of a step; TRUNCATED where an environment stops by itself, not at its end."""
@@ -69,3 +69,12 @@ def transition(dynamics: Dynamics, state: int, action: int, chance: float) -> in
     """Index of what follows an action; `chance` is uniform in [0, 1)."""
     first = (state * dynamics.actions + action) * dynamics.outcomes
     return sample(dynamics.cumulative, first, dynamics.outcomes, chance)
+
+
+@compiled_apart
+def finite(reward: float, observation: np.ndarray) -> bool:
+    """Whether a reward and every number of an observation [D] are finite."""
+    found = np.isfinite(reward)
+    for i in range(len(observation)):
+        found = found and np.isfinite(observation[i])
+    return found

@@ -12,7 +12,7 @@ from qbumpers.learners.double_dqn import Brain, DoubleDQN, Rates, learn, make_br
 from qbumpers.learners.network import Layout, values_of
 from qbumpers.learners.q_learning import choose, scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
-from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED
+from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED, finite
 from qbumpers.tasks.vector import VectorTask
 from qbumpers.values.network import NetworkValues
 
@@ -133,11 +133,9 @@ def _take(
     following: np.ndarray, event: int, streams: np.ndarray,
 ) -> bool:  # fmt: skip
     """Learn from a step; False where a number is not finite."""
-    finite = np.isfinite(reward)
-    for i in range(len(following)):
-        finite = finite and np.isfinite(following[i])
-    if finite:
+    sound = finite(reward, following)
+    if sound:
         terminated = event & TERMINATED != 0
         remember(Brain(*brain), observation, action, reward, following, terminated)
         learn(Layout(*network[0]), Brain(*brain), Rates(*numbers), streams[EVALUATION])
-    return finite
+    return sound
