@@ -106,7 +106,17 @@ def test_what_is_not_known_has_no_panel():
 
 def test_single_trials_have_points_without_bars():
     table = summary().with_columns(pl.selectors.ends_with("_low", "_high") * None)
-    drawn_from(table).draw_without_rendering()
+    drawing = drawn_from(table)
+    drawing.draw_without_rendering()
+    bars = [
+        segment
+        for axes in drawing.axes
+        for collection in axes.collections
+        for segment in collection.get_segments()
+    ]
+    assert bars
+    assert not any(np.ptp(segment, axis=0).any() for segment in bars)
+    assert all(np.isfinite(line.get_xdata()).any() for axes in drawing.axes for line in axes.lines)
 
 
 def test_rates_stay_within_what_rates_can_be_and_nothing_is_named_without_numbers():
