@@ -74,20 +74,6 @@ def compiled_apart(function: F) -> F:
     return _kept(function, _SETTINGS)
 
 
-def compiled_fused(function: F) -> F:
-    """As `compiled_apart`, for long rows of floats: multiplications and additions may be fused.
-
-    Results then differ in the last bit between processors with and without such an instruction.
-
-    Args:
-        function: a function in Numba's subset of Python.
-
-    Returns:
-        The same function.
-    """
-    return _kept(function, {**_SETTINGS, "fastmath": {"contract"}})
-
-
 def _kept(function: Any, settings: dict[str, Any]) -> Any:
     dispatcher: Any = numba.njit(**settings)(function)
     with contextlib.suppress(RuntimeError):  # without a writable folder, every process compiles

@@ -158,7 +158,9 @@ def write_page(monkeypatch):
     monkeypatch.syspath_prepend(DOCS)
     script = importlib.import_module("make_lunar_lander")
     drawn = []
-    monkeypatch.setattr(script, "keep_picture", lambda figure, images, name: drawn.append(name))
+    monkeypatch.setattr(
+        script, "keep_picture", lambda figure, images, name, colours: drawn.append(name)
+    )
 
     def write(folder, *arguments):
         drawn.clear()

@@ -14,6 +14,7 @@ from qbumpers.learners.double_dqn import (
     remember,
     update,
 )
+from qbumpers.learners.lanes import multiply_add
 from qbumpers.learners.network import named_parameters
 from qbumpers.random_streams import LEARNER, draw, trial_streams
 from tests.learners.textbook import TextbookLearner, double_dqn_loss, transitions
@@ -105,7 +106,7 @@ def test_a_thousand_updates_stay_together(clip):
 
 
 # Sums of products are rounded once where the compiled learner's are, so that bits can be compared.
-@numba.njit(error_model="numpy", fastmath={"contract"})
+@numba.njit(error_model="numpy")
 def fused_adam(parameters, moments, gradient, rate, updates):
     """Adam in float32 without any flush."""
     kind = np.float32
@@ -113,10 +114,10 @@ def fused_adam(parameters, moments, gradient, rate, updates):
     correction = kind(1 / np.sqrt(1 - 0.999**updates))
     for i in range(len(parameters)):
         slope = gradient[i]
-        moments[0, i] = kind(0.9) * moments[0, i] + kind(0.1) * slope
-        moments[1, i] = kind(0.999) * moments[1, i] + kind(0.001) * (slope * slope)
-        root = np.sqrt(moments[1, i]) * correction
-        parameters[i] -= step * moments[0, i] / (root + kind(1e-8))
+        moments[0, i] = multiply_add(kind(0.9), moments[0, i], kind(0.1) * slope)
+        moments[1, i] = multiply_add(kind(0.999), moments[1, i], kind(0.001) * (slope * slope))
+        scale = multiply_add(np.sqrt(moments[1, i]), correction, kind(1e-8))
+        parameters[i] -= step * moments[0, i] / scale
 
 
 def numpy_adam(parameters, moments, gradient, rate, updates):

@@ -6,7 +6,8 @@ of parameters that begins with them at `place` and goes on with the biases [outp
 
 import numpy as np
 
-from qbumpers.compilation import compiled, compiled_apart, compiled_fused
+from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.learners.lanes import multiply, multiply_add, transposed
 
 
 @compiled
@@ -23,10 +24,7 @@ def weighted_sums(
     inputs, outputs = below.shape[1], above.shape[1]
     end = place + outputs * inputs
     weights = matrix(parameters, place, inputs, outputs)
-    if below.shape[0] == 1:
-        np.dot(below[0], weights, above[0])
-    else:
-        np.dot(below, weights, above)
+    multiply(below, False, weights, above)
     return parameters[end : end + outputs]
 
 
@@ -38,7 +36,7 @@ def add_biases(sums: np.ndarray, bias: np.ndarray) -> None:
             sums[n, i] += bias[i]
 
 
-@compiled_fused
+@compiled_apart
 def activate(units: np.ndarray, bias: np.ndarray, relu: bool) -> None:
     """Add biases to sums [N, units] and apply the activation, in place."""
     kind = units.dtype.type
@@ -69,13 +67,14 @@ def activate(units: np.ndarray, bias: np.ndarray, relu: bool) -> None:
             x = limit if x > limit else x
             x = -limit if x < -limit else x
             z = x * x
-            above = x * (p0 + z * (p1 + z * (p2 + z * (p3 + z * p4))))
-            y = above / (one + z * (q1 + z * (q2 + z * (q3 + z * q4))))
+            above = multiply_add(z, multiply_add(z, multiply_add(z, p4, p3), p2), p1)
+            under = multiply_add(z, multiply_add(z, multiply_add(z, q4, q3), q2), q1)
+            y = x * multiply_add(z, above, p0) / multiply_add(z, under, one)
             y = one if y > one else y
             units[n, i] = -one if y < -one else y
 
 
-@compiled_fused
+@compiled_apart
 def derive(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
     """Multiply deltas [N, units] by the derivative of the activation at its results `units`."""
     kind = units.dtype.type
@@ -85,7 +84,7 @@ def derive(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
             if relu:
                 deltas[n, i] = deltas[n, i] if y > kind(0) else kind(0)
             else:
-                deltas[n, i] *= kind(1) - y * y
+                deltas[n, i] *= multiply_add(-y, y, kind(1))
 
 
 @compiled_apart
@@ -95,7 +94,7 @@ def gradient_of_layer(
     """Write the gradient of a layer from the units below it and the deltas above it."""
     inputs, outputs = below.shape[1], deltas.shape[1]
     end = place + outputs * inputs
-    np.dot(below.T, deltas, matrix(gradient, place, inputs, outputs))
+    multiply(below, True, deltas, matrix(gradient, place, inputs, outputs))
     gradient[end : end + outputs] = 0
     for n in range(deltas.shape[0]):
         for i in range(outputs):
@@ -108,5 +107,6 @@ def pass_down(
     below: np.ndarray,
 ) -> None:  # fmt: skip
     """Deltas of the layer below, into `below` [N, inputs], whose results were `units`."""
-    np.dot(deltas, matrix(parameters, place, units.shape[1], deltas.shape[1]).T, below)
+    weights = matrix(parameters, place, units.shape[1], deltas.shape[1])
+    multiply(deltas, False, transposed(weights), below)
     derive(below, units, relu)

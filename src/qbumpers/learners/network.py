@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.learners.lanes import multiply, transposed
 from qbumpers.learners.layers import (
     activate,
     add_biases,
@@ -264,8 +265,11 @@ def _backward_heads(
     pass_down(parameters, advantages_place, advantages, advantage_units, relu, advantage_down)
     gradient_of_layer(gradient, advantage_place, units, advantage_down)
     if len(sizes) > 1:
-        np.dot(value_down, matrix(parameters, place, last, streams).T, below)
-        sums = np.dot(advantage_down, matrix(parameters, advantage_place, last, streams).T)
+        weights = matrix(parameters, place, last, streams)
+        multiply(value_down, False, transposed(weights), below)
+        weights = matrix(parameters, advantage_place, last, streams)
+        sums = np.empty_like(below)
+        multiply(advantage_down, False, transposed(weights), sums)
         for n in range(states):
             for i in range(last):
                 below[n, i] += sums[n, i]

@@ -4,7 +4,6 @@ import math
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from qbumpers.assistants.dispatch import start
 from qbumpers.compilation import compiled_for_session, entered, uncompiled
@@ -54,11 +53,10 @@ def _run_trials(
     script: Script | None,
 ) -> None:
     each = streams(condition, trials, seed)
-    with threadpool_limits(1):  # matrices this small are multiplied fastest by one thread
-        for place, number in enumerate(trials):
-            trial = _Trial(condition, number, each[place], rows, script)
-            for episode in range(condition.episodes + condition.retention):
-                trial.live(episode, outcomes, place)
+    for place, number in enumerate(trials):
+        trial = _Trial(condition, number, each[place], rows, script)
+        for episode in range(condition.episodes + condition.retention):
+            trial.live(episode, outcomes, place)
 
 
 class _Calls(NamedTuple):

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from qbumpers.compilation import compiled_apart
 from qbumpers.errors import RequestError
@@ -76,8 +75,7 @@ def train_expert(
     content = ["train_expert", task.digest(), recipe]
     streams = trial_streams(seed, content, range(1))[0]
     brain = make_brain(learner, layout, streams[LEARNER])
-    with threadpool_limits(1):
-        _train(task, recipe, layout, brain, streams, report)
+    _train(task, recipe, layout, brain, streams, report)
     return NetworkValues(
         network=learner.network,
         inputs=task.observation_size,

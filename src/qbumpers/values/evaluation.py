@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from qbumpers.errors import RequestError
 from qbumpers.learners.double_dqn import DoubleDQN, learn, make_brain, rates, remember
@@ -113,11 +112,10 @@ def evaluated(
             f"branches = {branches}, learners = {learners}, seed = {seed}; at least 10, 1 and 0 "
             "are needed"
         )
-    with threadpool_limits(1):
-        visited = visit(task, values, learners, seed)
-        samples = sample_returns(task, values, visited, branches, seed, report)
-        held_out = samples.episodes % _HELD_OUT == 0
-        corrected = fitted(values, _chosen(samples, ~held_out), seed)
+    visited = visit(task, values, learners, seed)
+    samples = sample_returns(task, values, visited, branches, seed, report)
+    held_out = samples.episodes % _HELD_OUT == 0
+    corrected = fitted(values, _chosen(samples, ~held_out), seed)
     test = _chosen(samples, held_out & samples.tried)
     return Evaluation(corrected, fit_of(values, test), fit_of(corrected, test))
 

@@ -1,0 +1,215 @@
+"""Products of small matrices in vector registers, with the same sums on every processor.
+
+A linear algebra library picks its code, and with it the order of its sums, by the processor; the
+rounding errors that differ grow until two learners of one seed are two people. Here every sum runs
+in one fixed order and every multiplication and addition is fused (rounded once), however wide the
+registers are. For matrices as small as a learner's that is also faster.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.cgutils import get_or_insert_function
+from numba.extending import intrinsic, models, register_model
+
+from qbumpers.compilation import compiled, compiled_apart
+
+WIDE, NARROW, ALONE = 32, 4, 1
+"""How many numbers are worked on together, where so many are left."""
+
+_ROWS = 8  # of a tile; its 8 times 32 sums fill the registers of a processor with AVX-512
+
+
+class Lanes(types.Type):
+    """Numba's type of `width` floats that are worked on together.
+
+    Args:
+        number: Numba's type of each.
+        width: how many.
+    """
+
+    def __init__(self, number: Any, width: int) -> None:
+        self.number, self.width = number, width
+        super().__init__(f"Lanes({number}, {width})")
+
+    @property
+    def key(self) -> tuple[Any, int]:
+        """What tells one such type from another."""
+        return self.number, self.width
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, lanes: Lanes) -> None:
+        number = manager.lookup(lanes.number).get_value_type()
+        super().__init__(manager, lanes, ir.VectorType(number, lanes.width))
+
+
+def _in_place(build: Callable[..., Any]) -> Callable[..., Any]:
+    """A function whose calls become a few instructions, built from the types of its arguments."""
+    return intrinsic(prefer_literal=True)(build)
+
+
+@_in_place
+def zeros(typing: Any, numbers: Any, width: Any) -> Any:
+    """So many zeros of an array's kind of number: `zeros(array, 4)`."""
+    lanes = Lanes(numbers.dtype, width.literal_value)
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return ir.Constant(context.get_value_type(lanes), None)
+
+    return lanes(numbers, width), build
+
+
+@_in_place
+def load(typing: Any, numbers: Any, at: Any, like: Any) -> Any:
+    """Numbers of a contiguous array from a place on, as many as `like` has."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = _pointer(context, builder, numbers, arguments, like)
+        return builder.load(pointer, align=numbers.dtype.bitwidth // 8)
+
+    return like(numbers, types.intp, like), build
+
+
+@_in_place
+def store(typing: Any, numbers: Any, at: Any, lanes: Any) -> Any:
+    """Write lanes into a contiguous array from a place on."""
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        pointer = _pointer(context, builder, numbers, arguments, lanes)
+        builder.store(arguments[2], pointer, align=numbers.dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(numbers, types.intp, lanes), build
+
+
+def _pointer(context: Any, builder: Any, kind: Any, arguments: Any, lanes: Any) -> Any:
+    data = context.make_array(kind)(context, builder, arguments[0]).data
+    place = builder.gep(data, [arguments[1]])
+    return builder.bitcast(place, context.get_value_type(lanes).as_pointer())
+
+
+@_in_place
+def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
+    """`factor` times `other` plus `total`, rounded once; each a number or, like `total`, lanes."""
+    number = total.number if isinstance(total, Lanes) else total
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind = arguments[2].type
+        repeated = [_repeated(builder, value, kind) for value in arguments]
+        suffix = f"f{number.bitwidth}"
+        if isinstance(total, Lanes):
+            suffix = f"v{total.width}{suffix}"
+        fused = get_or_insert_function(
+            builder.module, ir.FunctionType(kind, [kind] * 3), f"llvm.fma.{suffix}"
+        )
+        return builder.call(fused, repeated)
+
+    def suited(given: Any) -> Any:
+        return given if isinstance(given, Lanes) else number
+
+    return total(suited(factor), suited(other), total), build
+
+
+def _repeated(builder: Any, value: Any, kind: Any) -> Any:
+    """A number in every lane; a value that has the kind already is left as it is."""
+    if value.type == kind:
+        return value
+    nothing = ir.Constant(kind, ir.Undefined)
+    first = builder.insert_element(nothing, value, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(
+        first, nothing, ir.Constant(ir.VectorType(ir.IntType(32), kind.count), None)
+    )
+
+
+@compiled_apart
+def multiply(left: np.ndarray, flipped: bool, right: np.ndarray, out: np.ndarray) -> None:
+    """Product of two contiguous matrices of equal kind, each of its sums in ascending order.
+
+    Args:
+        left: float [rows, depth], or [depth, rows] where it is `flipped`.
+        flipped: whether the left matrix is taken transposed.
+        right: float [depth, columns].
+        out: float [rows, columns], overwritten.
+    """
+    columns, column = right.shape[1], 0
+    while column + WIDE <= columns:
+        _strip(left, flipped, right, out, column, zeros(right, WIDE))
+        column += WIDE
+    while column + NARROW <= columns:
+        _strip(left, flipped, right, out, column, zeros(right, NARROW))
+        column += NARROW
+    while column < columns:
+        _strip(left, flipped, right, out, column, zeros(right, ALONE))
+        column += ALONE
+
+
+@compiled
+def _strip(left, flipped, right, out, column, zero):
+    """As many columns of a product as `zero` has lanes, from `column` on."""
+    depth, columns = right.shape
+    rows, row, one = out.shape[0], 0, right.dtype.type(0)
+    down, along = (1, rows) if flipped else (depth, 1)
+    while row + _ROWS <= rows:
+        a = b = c = d = e = f = g = h = zero
+        for k in range(depth):
+            lanes = load(right, k * columns + column, zero)
+            at = row * down + k * along
+            a = multiply_add(load(left, at, one), lanes, a)
+            b = multiply_add(load(left, at + down, one), lanes, b)
+            c = multiply_add(load(left, at + 2 * down, one), lanes, c)
+            d = multiply_add(load(left, at + 3 * down, one), lanes, d)
+            e = multiply_add(load(left, at + 4 * down, one), lanes, e)
+            f = multiply_add(load(left, at + 5 * down, one), lanes, f)
+            g = multiply_add(load(left, at + 6 * down, one), lanes, g)
+            h = multiply_add(load(left, at + 7 * down, one), lanes, h)
+        at = row * columns + column
+        store(out, at, a)
+        store(out, at + columns, b)
+        store(out, at + 2 * columns, c)
+        store(out, at + 3 * columns, d)
+        store(out, at + 4 * columns, e)
+        store(out, at + 5 * columns, f)
+        store(out, at + 6 * columns, g)
+        store(out, at + 7 * columns, h)
+        row += _ROWS
+    while row < rows:
+        total = zero
+        for k in range(depth):
+            lanes = load(right, k * columns + column, zero)
+            total = multiply_add(load(left, row * down + k * along, one), lanes, total)
+        store(out, row * columns + column, total)
+        row += 1
+
+
+@compiled_apart
+def transposed(numbers: np.ndarray) -> np.ndarray:
+    """A matrix [N, M] as a contiguous one [M, N]."""
+    rows, columns = numbers.shape
+    turned = np.empty((columns, rows), numbers.dtype)
+    for column in range(columns):
+        for row in range(rows):
+            turned[column, row] = numbers[row, column]
+    return turned
+
+
+@compiled_apart
+def sum_of_squares(numbers: np.ndarray) -> float:
+    """Sum of the squares of an array [N], `WIDE` interleaved sums and then those in turn."""
+    totals, place = zeros(numbers, WIDE), 0
+    while place + WIDE <= len(numbers):
+        lanes = load(numbers, place, totals)
+        totals = multiply_add(lanes, lanes, totals)
+        place += WIDE
+    each = np.empty(WIDE, numbers.dtype)
+    store(each, 0, totals)
+    total = numbers.dtype.type(0)
+    for i in range(WIDE):
+        total += each[i]
+    for i in range(place, len(numbers)):
+        total += numbers[i] * numbers[i]
+    return total
