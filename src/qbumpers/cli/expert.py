@@ -51,7 +51,7 @@ def expert(
     ] = None,
     seeds: Annotated[
         int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
-    ] = 4,
+    ] = 10,
     steps: Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)] = 400_000,
     activation: Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")] = "tanh",
     hidden: Annotated[
@@ -70,7 +70,7 @@ def expert(
     equals, after 50 random actions at the beginning. Where the task tells no success, mean returns
     decide instead. Training that was stopped goes on with the seeds that are missing.
 
-    Example: qbumpers expert lunar-lander --seeds 4 --out expert.npz
+    Example: qbumpers expert lunar-lander --out expert.npz
     """
     from qbumpers.tasks import TabularTask, make_task
 
