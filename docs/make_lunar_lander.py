@@ -1,6 +1,7 @@
 """Write the page on Lunar Lander from kept results: `python docs/make_lunar_lander.py`.
 
-With `--keep` it first keeps those of a finished run of `qbumpers reproduce lunar-lander`.
+With `--keep`, `--runs` and `--quality` it first keeps those of finished runs, which
+`run_lunar_lander.py` makes.
 """
 
 import argparse
@@ -14,17 +15,32 @@ import tomli_w
 from make_pictures import keep as keep_picture
 from writing import DOCS, measure, template
 
+from qbumpers import make_task
 from qbumpers.analysis.claims import Claim, judged
 from qbumpers.analysis.figures.curves import block_size, courses_figure, curves_figure
+from qbumpers.analysis.figures.quality import quality_figure
 from qbumpers.analysis.figures.runs import run_means, runs_figure
 from qbumpers.analysis.figures.sensitivity import sensitivities, sensitivity_figure
 from qbumpers.analysis.figures.style import NAMES, looks
 from qbumpers.analysis.figures.tradeoffs import tradeoffs, tradeoffs_figure
 from qbumpers.analysis.findings import find_tables
-from qbumpers.analysis.keeping import RUNS, Kept, keep, keep_runs, read_kept, read_trials
+from qbumpers.analysis.keeping import (
+    RUNS,
+    Kept,
+    keep,
+    keep_runs,
+    read_kept,
+    read_trials,
+    write_numbers,
+)
 from qbumpers.analysis.page.headlines import told
+from qbumpers.values import NetworkValues, load_values
+from qbumpers.values.quality import check_values, summarise
 
 _COLOURS = 48  # bands that overlap make many, and large files
+
+QUALITY = "quality.csv"
+"""What Q values of several files claim, and what is achieved: a row a claim."""
 
 ABOUT = "about.toml"
 DEFAULT = "default"
@@ -55,6 +71,10 @@ def make(data: Path, folder: Path) -> None:
     runs = compared_runs(kept, data / RUNS)
     if runs is not None:
         keep_picture(runs_figure(runs.means, looks(NAMES)), images, "lunar-lander-runs", _COLOURS)
+    claims = kept_claims(data / QUALITY)
+    if claims:
+        figure = quality_figure(list(claims.items())[:2])
+        keep_picture(figure, images, "lunar-lander-quality", _COLOURS)
     text = template("lunar-lander.md.j2").render(
         experiment=kept.experiment,
         run=kept.run,
@@ -62,6 +82,7 @@ def make(data: Path, folder: Path) -> None:
         block=block_size(kept.experiment.episodes),
         findings=findings,
         runs=runs,
+        quality={name: summarise(rows) for name, rows in claims.items()},
         told=told,
         measure=measure,
     )
@@ -102,9 +123,40 @@ def compared_runs(kept: Kept, path: Path) -> Runs | None:
     return Runs(means, cells, claims)
 
 
+def keep_quality(files: dict[str, str], into: Path) -> None:
+    """Check the Q values in files, and keep what they claim off the expert's path and at the start.
+
+    Args:
+        files: by name.
+        into: folder for the table.
+    """
+    task, parts = make_task("lunar-lander"), []
+    for name, path in files.items():
+        values = load_values(path)
+        assert isinstance(values, NetworkValues)
+        claims = check_values(task, values, discount=values.discount)
+        told = claims.filter((pl.col("policy") != "greedy") | (pl.col("time") == 0))
+        parts.append(told.select(pl.lit(name).alias("values"), pl.all()))
+    write_numbers(into / QUALITY, pl.concat(parts))
+
+
+def kept_claims(path: Path) -> dict[str, pl.DataFrame]:
+    """What `keep_quality` kept, by name; nothing where there is none."""
+    if not path.is_file():
+        return {}
+    table = pl.read_csv(path, infer_schema_length=None)
+    parts = table.partition_by("values", maintain_order=True)
+    return {part["values"][0]: part.drop("values") for part in parts}
+
+
 def about(path: Path) -> dict[str, Any]:
     """What a person noted of the run; nothing where there is no note."""
     return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def by_name(pairs: list[str]) -> dict[str, str]:
+    """Paths by name, from `NAME=PATH`."""
+    return dict(pair.rsplit("=", 1) for pair in pairs)
 
 
 def main() -> None:
@@ -117,14 +169,20 @@ def main() -> None:
     parser.add_argument("--machine", help="that it ran on, to be told, such as 'two cores'")
     parser.add_argument("--note", help="a sentence on the run, to be told")
     parser.add_argument("--runs", nargs="+", metavar="NAME=FOLDER", help="runs to be kept beside")
+    parser.add_argument(
+        "--quality", nargs="+", metavar="NAME=FILE", help="Q values to be checked; two are drawn"
+    )
     asked = parser.parse_args()
+    noted = {"hours": asked.hours, "machine": asked.machine, "note": asked.note}
+    noted = {name: value for name, value in noted.items() if value is not None}
     if asked.keep:
         keep(asked.keep, asked.data)
-        noted = {"hours": asked.hours, "machine": asked.machine, "note": asked.note}
-        noted = {name: value for name, value in noted.items() if value is not None}
+    if asked.keep or noted:
         (asked.data / ABOUT).write_text(tomli_w.dumps(noted), encoding="utf-8")
     if asked.runs:
-        keep_runs(dict(run.rsplit("=", 1) for run in asked.runs), asked.data)
+        keep_runs(by_name(asked.runs), asked.data)
+    if asked.quality:
+        keep_quality(by_name(asked.quality), asked.data)
     make(asked.data, asked.folder)
 
 

@@ -22,7 +22,7 @@ def template(name: str) -> jinja2.Template:
         keep_trailing_newline=True,
         undefined=jinja2.StrictUndefined,
     )
-    filters = (number, per_cent, estimate, rate, readable)
+    filters = (number, per_cent, estimate, with_error, rate, readable)
     environment.filters |= {f.__name__: f for f in filters}
     return environment.get_template(name)
 
@@ -45,6 +45,13 @@ def estimate(value: Estimate, digits: int = 1) -> str:
         return number(None)
     half = (value.high - value.low) / 2
     return f"{number(value.mean, digits)}{PLUS_MINUS}{number(half, digits)}"
+
+
+def with_error(value: Any, digits: int = 1) -> str:
+    """A mean with 1.96 of its standard error; a dash where there is none."""
+    if value is None or not np.isfinite(value.mean):
+        return number(None)
+    return f"{number(value.mean, digits)}{PLUS_MINUS}{number(1.96 * value.error, digits)}"
 
 
 def rate(value: Estimate) -> str:

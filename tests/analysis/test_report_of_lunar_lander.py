@@ -23,6 +23,7 @@ from qbumpers.analysis.measures import trial_measures
 from qbumpers.analysis.report import find, write_report
 from qbumpers.errors import RequestError
 from qbumpers.experiments.store import load
+from qbumpers.values import experts
 from tests.analysis.landings import made_up
 from tests.analysis.pages import Page
 
@@ -193,6 +194,52 @@ def test_the_page_is_made_from_a_run_and_again_from_what_was_kept(landed, write_
     alone, _ = write_page(tmp_path / "again", "--data", str(data))
     assert "## Other settings" not in alone
     assert "the run took" not in alone
+
+
+def claims_that(exceed, episodes=6):
+    """Made-up claims: greedy episodes of ten steps, and others with a crash after three."""
+    rows = [
+        ("greedy" if greedy else "10% random", episode, time, None if greedy else 3 - time, 0.5)
+        for greedy in (True, False)
+        for episode in range(episodes)
+        for time in range(10 if greedy else 3)
+    ]
+    names = ["policy", "episode", "time", "before_crash", "distance"]
+    found = pl.DataFrame(rows, schema=names, orient="row", infer_schema_length=None)
+    return found.with_columns(
+        pl.lit(True).alias("at_random"),
+        value=50.0 + exceed,
+        achieved=pl.when(pl.col("time") == 0).then(None).otherwise(50.0 + pl.col("episode")),
+    )
+
+
+def test_q_values_are_checked_kept_and_told(kept, write_page, monkeypatch, tmp_path):
+    shipped = Path(experts.__file__).parent / "built_in" / "lunar-lander.npz"
+    excesses = iter([20.0, -5.0])
+    monkeypatch.setattr(
+        importlib.import_module("make_lunar_lander"),
+        "check_values",
+        lambda task, values, *, discount: claims_that(next(excesses)),
+    )
+    asked = ["--quality", f"expert={shipped}", f"a=second={shipped}"]
+    text, drawn = write_page(tmp_path / "page", "--data", str(kept), *asked)
+    table = pl.read_csv(kept / "quality.csv")
+    assert table.height == 2 * (6 + 6 * 3)  # of greedy episodes, only their start
+    assert "lunar-lander-quality" in drawn
+    dash = "\N{EN DASH}"
+    for name, claimed, bias, share in (
+        ("expert", 70.0, 17.5, "100%"),
+        ("a=second", 45.0, -7.5, "0%"),
+    ):
+        [row] = [line for line in text.splitlines() if line.startswith(f"| {name} |")]
+        cells = [cell.strip().replace("\N{MINUS SIGN}", "-") for cell in row.split("|")[2:-1]]
+        assert float(cells[0]) == claimed
+        assert cells[1] == dash  # the return of the start is not known here
+        assert float(cells[2].split()[0].split("\N{NO-BREAK SPACE}")[0]) == bias
+        assert cells[4] == share
+        assert float(cells[5].split("\N{NO-BREAK SPACE}")[0]) == claimed
+        assert float(cells[6]) == 52.5
+    (kept / "quality.csv").unlink()
 
 
 def test_every_row_of_the_pages_tables_has_as_many_cells_as_its_head(kept, write_page, tmp_path):

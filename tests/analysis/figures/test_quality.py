@@ -1,6 +1,7 @@
 """Figures of a check of values show its numbers."""
 
 import numpy as np
+import polars as pl
 import pytest
 
 from qbumpers.analysis.figures.quality import quality_figure
@@ -51,3 +52,10 @@ def test_a_check_without_crashes_is_drawn_and_saved(claims, tmp_path):
     name, rows = claims[0]
     safe = rows.with_columns(before_crash=None)
     assert save(quality_figure([(name, safe)]), tmp_path, "quality").exists()
+
+
+def test_values_that_are_all_alike_are_drawn_as_one_point(claims):
+    name, rows = claims[0]
+    alike = rows.with_columns(value=pl.lit(3.0))
+    [point] = lines_of(quality_figure([(name, alike)]).axes[0])
+    assert point.get_xdata() == pytest.approx(3.0)

@@ -87,5 +87,5 @@ def _draw(axes: Axes, place: int, name: str, table: pl.DataFrame, x: str, y: str
 
 def _even_edges(numbers: np.ndarray) -> list[float]:
     """Edges of bins that hold about equally many numbers."""
-    edges = np.unique(np.quantile(numbers, np.linspace(0, 1, _BINS + 1)))
-    return [*edges[:-1].tolist(), float(np.nextafter(edges[-1], np.inf))]
+    first, *later = np.unique(np.quantile(numbers, np.linspace(0, 1, _BINS + 1))).tolist()
+    return [first, *later[:-1], float(np.nextafter(later[-1] if later else first, np.inf))]
