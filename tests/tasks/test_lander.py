@@ -1,6 +1,9 @@
 """The fast lander against Gymnasium's class, number for number."""
 
 import collections
+import gc
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED
 from qbumpers.tasks.lander import Lander, chance_of
 from tests.tasks.landing import PAPER_SEED, OriginalLander, actions_of
 
+STATM = Path("/proc/self/statm")
 LANDED, CRASHED = TERMINATED | SUCCESS, TERMINATED | CRASH
 
 
@@ -95,6 +99,20 @@ def test_landers_do_not_disturb_each_other_and_observations_are_kept():
         observations.append(first.step(action)[0])
         second.step(2)
     assert np.array_equal(observations, expected)
+
+
+@pytest.mark.skipif(not STATM.exists(), reason="the system does not tell a process's memory")
+def test_thousands_of_episodes_leave_nothing_in_memory():
+    lander = Lander()
+
+    def after(episodes):
+        for _ in range(episodes):
+            lander.reset(0.0)
+        gc.collect()
+        return int(STATM.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    before = after(1_000)
+    assert after(6_000) - before < 1_000_000  # an edge of the ground that is lost costs 70 bytes
 
 
 @pytest.mark.parametrize("seed", [-1, 0.5, "0", True])

@@ -31,6 +31,7 @@ from qbumpers.tasks.lander_bodies import (
     X,
     Y,
     build,
+    ground_of,
     motion_of,
 )
 from qbumpers.tasks.vector import VectorTask
@@ -92,7 +93,7 @@ class Lander:
 
     def __init__(self, seed: int | None = None) -> None:
         self._chance = chance_of(seed)
-        self._heights = self._chance.uniform(0, HEIGHT / 2, size=12)
+        self._ground = ground_of(self._chance.uniform(0, HEIGHT / 2, size=12))
         self._force = (
             self._chance.uniform(-_FORCE, _FORCE),
             self._chance.uniform(-_FORCE, _FORCE),
@@ -111,7 +112,7 @@ class Lander:
         """
         self._state = np.zeros(_STATE_SIZE)
         self._contacts = Contacts(self._state)
-        self._world, self._hull = build(self._heights, self._force, self._contacts)
+        self._world, self._hull = build(self._ground, self._force, self._contacts)
         self._motion = motion_of(self._hull)
         self._steps = 0
         return self.step(_NOTHING)[0]

@@ -70,13 +70,39 @@ def _part(contact: Any) -> int:
     return contact.fixtureB.body.userData if first is None else first
 
 
-def build(heights: np.ndarray, force: tuple[float, float], contacts: Contacts) -> tuple[Any, Any]:
+def ground_of(heights: np.ndarray) -> list[Any]:
+    """The ground, to be built into every world; Box2D leaks a little with each edge made anew.
+
+    Args:
+        heights: [12], metres; those around the landing pad are levelled.
+
+    Returns:
+        A b2FixtureDef for each edge, the lowest one first.
+    """
+    levelled = heights.tolist()
+    middle = _CHUNKS // 2
+    levelled[middle - 2 : middle + 3] = [HEIGHT / 4] * 5
+    smooth = [0.33 * (levelled[i - 1] + levelled[i] + levelled[i + 1]) for i in range(_CHUNKS)]
+    across = [WIDTH / (_CHUNKS - 1) * i for i in range(_CHUNKS)]
+    points = list(zip(across, smooth, strict=True))
+    return [
+        Box2D.b2FixtureDef(shape=Box2D.b2EdgeShape(vertices=[(0, 0), (WIDTH, 0)])),
+        *(
+            Box2D.b2FixtureDef(
+                shape=Box2D.b2EdgeShape(vertices=list(edge)), density=0, friction=0.1
+            )
+            for edge in itertools.pairwise(points)
+        ),
+    ]
+
+
+def build(ground: list[Any], force: tuple[float, float], contacts: Contacts) -> tuple[Any, Any]:
     """A world with the ground and a lander on which a force acts.
 
     A new world for every episode: Box2D keeps caches that change later episodes in an old one.
 
     Args:
-        heights: [12], metres; those around the landing pad are levelled.
+        ground: from `ground_of`.
         force: newtons, during the first step.
         contacts: told of contacts; must live as long as the world.
 
@@ -85,7 +111,9 @@ def build(heights: np.ndarray, force: tuple[float, float], contacts: Contacts) -
     """
     world = Box2D.b2World(gravity=(0, GRAVITY))
     world.contactListener = contacts
-    _build_ground(world, heights)
+    earth = world.CreateStaticBody()
+    for edge in ground:
+        earth.CreateFixture(edge)
     hull = world.CreateDynamicBody(position=(WIDTH / 2, HEIGHT), angle=0.0, fixtures=_hull())
     hull.userData = _HULL
     hull.ApplyForceToCenter(force, True)
@@ -96,18 +124,6 @@ def build(heights: np.ndarray, force: tuple[float, float], contacts: Contacts) -
         leg.userData = number
         world.CreateJoint(_hip(hull, leg, side))
     return world, hull
-
-
-def _build_ground(world: Any, heights: np.ndarray) -> None:
-    levelled = heights.tolist()
-    middle = _CHUNKS // 2
-    levelled[middle - 2 : middle + 3] = [HEIGHT / 4] * 5
-    smooth = [0.33 * (levelled[i - 1] + levelled[i] + levelled[i + 1]) for i in range(_CHUNKS)]
-    across = [WIDTH / (_CHUNKS - 1) * i for i in range(_CHUNKS)]
-    points = list(zip(across, smooth, strict=True))
-    ground = world.CreateStaticBody(shapes=Box2D.b2EdgeShape(vertices=[(0, 0), (WIDTH, 0)]))
-    for left, right in itertools.pairwise(points):
-        ground.CreateEdgeFixture(vertices=[left, right], density=0, friction=0.1)
 
 
 @functools.cache
