@@ -6,11 +6,12 @@ import sys
 import polars as pl
 import pytest
 
+from qbumpers.errors import RequestError
 from qbumpers.experiments.sources import profiles
 from tests.experiments.examples import cart, write_toml
 from tests.processes import ENVIRONMENT
 from tests.texts import words
-from tests.values.networks import network_of
+from tests.values.networks import constant, network_of
 
 WITHOUT_BOX2D = """
 import sys
@@ -78,11 +79,35 @@ def test_without_box2d_the_extra_to_install_is_named(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("command", [("run",), ("tune", "--floor", "5")])
+def test_values_worse_than_random_are_warned_of_before_any_work(
+    call, tmp_path, monkeypatch, command
+):
+    def refuse(*_, **__):
+        raise RequestError("enough")
+
+    monkeypatch.setattr("qbumpers.experiments.run.run_experiment", refuse)
+    monkeypatch.setattr("qbumpers.tuning.tune", refuse)
+    constant(0, 4, 2, task="CartPole-v1").save(tmp_path / "fall.npz")
+    path = write_toml(
+        tmp_path / "cart.toml", **cart(tmp_path) | {"values": str(tmp_path / "fall.npz")}
+    )
+    name, *options = command
+    status, _, errors = call(name, path, *options)
+    assert status == 2
+    warning, refused = errors.splitlines()
+    assert warning.startswith("warning: values of task CartPole-v1: their greedy policy returns")
+    assert warning.endswith("results say nothing about the method")
+    assert refused == "error: enough"
+
+
 @pytest.mark.slow
 def test_a_run_with_deep_learners_ends_with_a_report(call, tmp_path):
     path = write_toml(tmp_path / "cart.toml", **cart(tmp_path))
     status, output, errors = call("run", path, "--workers", 1, "--out", tmp_path / "out")
-    assert (status, errors) == (0, "")
+    assert status == 0
+    [warning] = errors.splitlines()  # the expert is a random network
+    assert "warning: values of task CartPole-v1" in warning
     assert "2 conditions, 2 trials of 5 episodes" in words(output)
     assert pl.read_csv(tmp_path / "out" / "summary.csv").height == 2
     assert (tmp_path / "out" / "report.html").is_file()

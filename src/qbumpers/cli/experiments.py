@@ -9,6 +9,7 @@ from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, duration, interval, table, typeable
+from qbumpers.cli.expert import warn_of_bad_values
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
 from qbumpers.errors import RequestError
@@ -149,6 +150,7 @@ def _run(experiment: Any, workers: int | None, on: str | None, out: str | None) 
         f"trials of {experiment.episodes} episodes{alone}, into {escape(folder)}",
         soft_wrap=True,
     )
+    warn_of_bad_values(plan.task, plan.values)
     with executor_for(workers, on) as executor, TrialProgress("simulating", _announce) as progress:
         run_experiment(plan, folder, executor=executor, report=progress.show)
     _analyse(folder)

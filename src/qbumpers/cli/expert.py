@@ -16,9 +16,9 @@ from qbumpers.errors import RequestError
 if TYPE_CHECKING:
     import polars as pl
 
-    from qbumpers.tasks import TabularTask
+    from qbumpers.tasks import TabularTask, Task
     from qbumpers.tasks.vector import VectorTask
-    from qbumpers.values import NetworkValues, Recipe
+    from qbumpers.values import NetworkValues, Recipe, TabularValues
     from qbumpers.values.experts import Estimate
     from qbumpers.values.selection import Judgement
 
@@ -132,7 +132,7 @@ def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -
     kept = with_record(task, trained[chosen], judgements[chosen], seeds)
     kept.save(path)
     OUTPUT.print(_judgements(task, seeds, judgements))
-    _warn(task, kept)
+    warn_of_bad_values(task, kept)
     OUTPUT.print(
         f"Kept seed {seeds[chosen]} in [bold]{escape(str(path))}[/bold]; all of them are in "
         f"{escape(str(work))}",
@@ -146,9 +146,13 @@ def _steps_bar() -> Progress:
     return Progress(*columns, console=OUTPUT)
 
 
-def _warn(task: "VectorTask", values: "NetworkValues") -> None:
-    """Say so where the values are no better than random play."""
+def warn_of_bad_values(task: "Task", values: "TabularValues | NetworkValues") -> None:
+    """Say so where a network's values are no better than random play."""
+    from qbumpers.tasks import TabularTask
     from qbumpers.values import ExpertWarning, check_expert
+
+    if isinstance(task, TabularTask):
+        return
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ExpertWarning)
@@ -189,7 +193,7 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
     with OUTPUT.status("judging"):
         judgement = judge(task, values)
     OUTPUT.print(_judgements(task, ["-"], [judgement]))
-    _warn(task, values)
+    warn_of_bad_values(task, values)
     with OUTPUT.status("going where learners go"):
         claims = check_values(task, values, discount=values.discount)
     found = summarise(claims)

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, interval, table
+from qbumpers.cli.expert import warn_of_bad_values
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
 
@@ -46,6 +47,7 @@ def tune(
 
     with stoppable():
         plan = make_plan(load_experiment(experiment))
+        warn_of_bad_values(plan.task, plan.values)
         folder = out or f"results/{plan.experiment.name}"
         OUTPUT.print(
             f"[bold]{plan.experiment.name}[/bold]: {len(plan.named)} conditions race, up to "
