@@ -175,7 +175,7 @@ def courses_figure(courses: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
         axes = drawing.subplots()
         _draw(axes, _percentages(courses, "override_rate"), "override_rate", drawn)
         axes.set(xlabel="episode", ylabel="steps overridden, per cent")
-        axes.set_ylim(bottom=min(0.0, *axes.get_ylim()))
+        axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])  # intervals of rates may end below zero
         _legend(drawing)
     return drawing
 
