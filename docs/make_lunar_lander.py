@@ -42,6 +42,9 @@ _COLOURS = 48  # bands that overlap make many, and large files
 QUALITY = "quality.csv"
 """What Q values of several files claim, and what is achieved: a row a claim."""
 
+READING = "reading.md"
+"""What people make of kept results, in words; goes when others are kept."""
+
 ABOUT = "about.toml"
 DEFAULT = "default"
 """What a person adds to kept results: hours, machine, a note; and what their run is called."""
@@ -82,6 +85,7 @@ def make(data: Path, folder: Path) -> None:
         block=block_size(kept.experiment.episodes),
         findings=findings,
         runs=runs,
+        reading=reading(data / READING),
         quality={name: summarise(rows) for name, rows in claims.items()},
         told=told,
         measure=measure,
@@ -149,6 +153,11 @@ def kept_claims(path: Path) -> dict[str, pl.DataFrame]:
     return {part["values"][0]: part.drop("values") for part in parts}
 
 
+def reading(path: Path) -> str:
+    """What people made of the results; empty where they did not say."""
+    return path.read_text(encoding="utf-8").strip() if path.is_file() else ""
+
+
 def about(path: Path) -> dict[str, Any]:
     """What a person noted of the run; nothing where there is no note."""
     return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
@@ -177,6 +186,7 @@ def main() -> None:
     noted = {name: value for name, value in noted.items() if value is not None}
     if asked.keep:
         keep(asked.keep, asked.data)
+        (asked.data / READING).unlink(missing_ok=True)
     if asked.keep or noted:
         (asked.data / ABOUT).write_text(tomli_w.dumps(noted), encoding="utf-8")
     if asked.runs:
