@@ -42,7 +42,7 @@ _COLOURS = 48  # bands that overlap make many, and large files
 QUALITY = "quality.csv"
 """What Q values of several files claim, and what is achieved: a row a claim."""
 
-READING = "reading.md"
+READING = "reading.txt"
 """What people make of kept results, in words; goes when others are kept."""
 
 ABOUT = "about.toml"

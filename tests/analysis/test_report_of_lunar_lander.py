@@ -196,6 +196,18 @@ def test_the_page_is_made_from_a_run_and_again_from_what_was_kept(landed, write_
     assert "the run took" not in alone
 
 
+def test_words_on_the_results_are_told_until_others_are_kept(landed, write_page, tmp_path):
+    data = tmp_path / "data"
+    write_page(tmp_path / "page", "--data", str(data), "--keep", str(landed))
+    (data / "reading.txt").write_text("**Bumpers teach.**\n", encoding="utf-8")
+    text, _ = write_page(tmp_path / "page", "--data", str(data))
+    assert "## What to make of it\n\n**Bumpers teach.**\n\n## The paper's claims" in text
+    text, _ = write_page(tmp_path / "page", "--data", str(data), "--hours", "3")
+    assert "**Bumpers teach.**" in text
+    text, _ = write_page(tmp_path / "page", "--data", str(data), "--keep", str(landed))
+    assert "What to make of it" not in text
+
+
 def claims_that(exceed, episodes=6):
     """Made-up claims: greedy episodes of ten steps, and others with a crash after three."""
     rows = [
