@@ -69,8 +69,7 @@ def make(folder: Path) -> None:
     shown = ["none", "maximal", LEARNING]
     curves = learning_curves(figures.results.episodes, shown)
     keep(curves_figure(curves, looks(NAMES)), images, "learning")
-    page = template("reproduction.md.j2")
-    page.environment.filters["label"] = label
+    page = template("reproduction.md.j2", label)
     values = figures.results.values
     assert isinstance(values, TabularValues)
     thresholds = figures.findings.summary.filter(pl.col("assistant") == "local-q-thresholding")

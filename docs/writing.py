@@ -1,5 +1,6 @@
 """What the scripts that write pages share: templates, and numbers as pages have them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ DOCS = Path(__file__).parent
 PLUS_MINUS = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
 
 
-def template(name: str) -> jinja2.Template:
-    """A page to be filled in, for instance "reproduction.md.j2"."""
+def template(name: str, *more: Callable[..., str]) -> jinja2.Template:
+    """A page to be filled in, for instance "reproduction.md.j2", with more filters of its own."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(DOCS),
         trim_blocks=True,
@@ -22,7 +23,7 @@ def template(name: str) -> jinja2.Template:
         keep_trailing_newline=True,
         undefined=jinja2.StrictUndefined,
     )
-    filters = (number, per_cent, estimate, with_error, rate, readable)
+    filters = (number, per_cent, estimate, with_error, rate, readable, *more)
     environment.filters |= {f.__name__: f for f in filters}
     return environment.get_template(name)
 

@@ -146,7 +146,9 @@ def test_a_stopped_run_keeps_what_is_finished_and_leaves_no_process(tmp_path, nu
     if number == signal.SIGKILL:
         assert status == -number
     else:
-        assert (status, errors) == (1, STOPPED)
+        warning, stopped = errors.splitlines(keepends=True)
+        assert "values of task CartPole-v1" in warning  # the expert is a random network
+        assert (status, stopped) == (1, STOPPED)
     kept = contents_of(tmp_path / "out", "cells/**/*")
     assert 2 <= len(kept) < 12
     reports = []

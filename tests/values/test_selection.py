@@ -102,9 +102,12 @@ def test_the_provenance_says_how_it_was_chosen_and_what_it_reaches(tmp_path):
 
 @pytest.mark.slow
 def test_the_best_of_four_experts_balances_a_pole(tmp_path):
-    """60,000 steps each; single ones come and go, as Double DQN does at this task."""
+    """100,000 steps each; single ones come and go, as Double DQN does at this task."""
     task = make_task("CartPole-v1", discount=0.99)
-    learner = DoubleDQN(epsilon=Schedule(1.0, 0.02, 0.2), learning_rate=1e-3, target_every=500)
-    trained = train_several(task, Recipe(learner, 60_000, 0), range(4), tmp_path)
+    learner = DoubleDQN(
+        network=Network((128,), "relu"), epsilon=Schedule(1.0, 0.02, 0.2), batch_size=128,
+        target_every=1_000,
+    )  # fmt: skip
+    trained = train_several(task, Recipe(learner, 100_000, 0), range(4), tmp_path)
     judgements = [judge(task, values, episodes=20) for values in trained]
     assert judgements[best(judgements)].greedy_return.mean >= 400
