@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qbumpers.learners.lanes import multiply, multiply_add, sum_of_squares, transposed
+from qbumpers.learners.lanes import column_sums, multiply, multiply_add, sum_of_squares, transposed
 from tests.learners.several_updates import NETWORKS
 
 SIZES = st.integers(1, 70)
@@ -77,6 +77,16 @@ def test_a_product_and_a_sum_are_rounded_once(precision, half):
 def test_squares_are_summed(size):
     numbers = np.arange(size) - 30.0
     assert sum_of_squares(numbers) == (numbers**2).sum()
+
+
+@given(rows=SIZES, columns=SIZES, precision=st.sampled_from(PRECISIONS))
+def test_columns_are_summed_row_after_row(rows, columns, precision):
+    numbers = drawn((rows, columns), precision)
+    sums, expected = np.full(columns, np.nan, precision), np.zeros(columns, precision)
+    column_sums(numbers, sums)
+    for row in numbers:
+        expected += row
+    assert np.array_equal(sums, expected)
 
 
 def test_a_transposed_matrix_is_contiguous():

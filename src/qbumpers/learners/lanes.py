@@ -187,6 +187,33 @@ def _strip(left, flipped, right, out, column, zero):
 
 
 @compiled_apart
+def column_sums(numbers: np.ndarray, out: np.ndarray) -> None:
+    """Sum of each column of a contiguous matrix, its rows in ascending order.
+
+    Args:
+        numbers: float [rows, columns].
+        out: float [columns], overwritten.
+    """
+    columns, column = numbers.shape[1], 0
+    while column + WIDE <= columns:
+        _sums_of_strip(numbers, out, column, zeros(numbers, WIDE))
+        column += WIDE
+    while column < columns:
+        _sums_of_strip(numbers, out, column, zeros(numbers, ALONE))
+        column += ALONE
+
+
+@compiled
+def _sums_of_strip(numbers, out, column, total):
+    """As many sums of columns as `total` has lanes, from `column` on."""
+    rows, columns = numbers.shape
+    one = numbers.dtype.type(1)
+    for row in range(rows):
+        total = multiply_add(one, load(numbers, row * columns + column, total), total)
+    store(out, column, total)
+
+
+@compiled_apart
 def transposed(numbers: np.ndarray) -> np.ndarray:
     """A matrix [N, M] as a contiguous one [M, N]."""
     rows, columns = numbers.shape

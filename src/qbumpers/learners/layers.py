@@ -7,7 +7,7 @@ of parameters that begins with them at `place` and goes on with the biases [outp
 import numpy as np
 
 from qbumpers.compilation import compiled, compiled_apart
-from qbumpers.learners.lanes import multiply, multiply_add, transposed
+from qbumpers.learners.lanes import column_sums, multiply, multiply_add, transposed
 
 
 @compiled
@@ -95,10 +95,7 @@ def gradient_of_layer(
     inputs, outputs = below.shape[1], deltas.shape[1]
     end = place + outputs * inputs
     multiply(below, True, deltas, matrix(gradient, place, inputs, outputs))
-    gradient[end : end + outputs] = 0
-    for n in range(deltas.shape[0]):
-        for i in range(outputs):
-            gradient[end + i] += deltas[n, i]
+    column_sums(deltas, gradient[end : end + outputs])
 
 
 @compiled_apart

@@ -8,6 +8,10 @@ from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 
 from qbumpers.tasks import TabularTask, Task
 
+# Forked from a process that has loaded the libraries and nothing else, processes share their
+# memory and begin at once; Windows cannot fork.
+_START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+
 
 def make_pool(task: Task, workers: int) -> Executor:
     """A pool that suits a task.
@@ -24,7 +28,8 @@ def make_pool(task: Task, workers: int) -> Executor:
     """
     if isinstance(task, TabularTask):
         return ThreadPoolExecutor(workers)
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context(_START)
+    context.set_forkserver_preload(["qbumpers.simulation.shared_by_processes"])
     return ProcessPoolExecutor(workers, context, initializer=_follow_parent)
 
 
