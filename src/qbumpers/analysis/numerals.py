@@ -21,6 +21,11 @@ def per_cent(value: float | None) -> str:
 
 
 def digits_for(low: float | None, high: float | None, least: int = 1) -> int:
-    """Decimals that an interval needs: three where it is narrower than 0.2."""
-    narrow = low is not None and high is not None and 0 < high - low < 0.2
-    return max(least, 3) if narrow else least
+    """Decimals that an interval needs: three where it is narrower than 0.2.
+
+    An interval of equal numbers needs no more, though rounding gives its ends another last bit.
+    """
+    if low is None or high is None:
+        return least
+    rounding = 1e-9 * max(abs(low), abs(high))
+    return max(least, 3) if rounding < high - low < 0.2 else least

@@ -5,6 +5,8 @@ import math
 from rich.console import Console
 from rich.table import Table
 
+from qbumpers.analysis.numerals import digits_for
+
 OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
 
 
@@ -18,8 +20,7 @@ def table(*columns: str) -> Table:
 
 def interval(mean: float, low: float | None, high: float | None, digits: int = 1) -> str:
     """A mean with half the width of its interval, where it has one."""
-    if low is not None and high is not None and 0 < high - low < 0.2:
-        digits = max(digits, 3)  # returns of size 1, for instance
+    digits = digits_for(low, high, digits)
     if low is None or high is None or not math.isfinite(low):
         return f"{mean:.{digits}f}"
     return f"{mean:.{digits}f} \N{PLUS-MINUS SIGN} {(high - low) / 2:.{digits}f}"
