@@ -1,10 +1,12 @@
 """Experiments with deep learners, end to end: cells, order, tables, and being stopped."""
 
+import dataclasses
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -156,6 +158,46 @@ def test_a_stopped_run_keeps_what_is_finished_and_leaves_no_process(tmp_path, nu
     run_experiment(plan, tmp_path / "out", executor=ThisMachine(2), report=reports.append)
     assert reports[0].trials == len(kept)
     assert kept.items() <= contents_of(tmp_path / "out", "cells/**/*").items()
+
+
+class Sleeper:
+    """An environment that takes a minute to begin."""
+
+    def reset(self, chance):
+        time.sleep(60)
+
+
+def as_an_experiment(plan, content):
+    return list(ThisMachine(1)(plan, {Cell(content, 0, 1): 60.0}))
+
+
+def as_a_simulation(plan, content):
+    return run(plan.conditions[content], trials=2, workers=2)
+
+
+@pytest.mark.parametrize("work", [as_an_experiment, as_a_simulation])
+def test_a_signal_that_another_thread_receives_ends_work_at_once(tmp_path, work):
+    plan = planned(tmp_path)
+    task = dataclasses.replace(plan.task, make_stepper=Sleeper)
+    [(content, condition), *_] = plan.conditions.items()
+    plan = plan._replace(task=task, conditions={content: condition._replace(task=task)})
+    heard, in_time = threading.Event(), []
+
+    def interrupt():
+        while not multiprocessing.active_children():
+            time.sleep(0.02)
+        time.sleep(0.5)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        in_time.append(heard.wait(30))
+
+    other = threading.Thread(target=interrupt)
+    other.start()
+    with pytest.raises(KeyboardInterrupt):
+        work(plan, content)
+    heard.set()
+    other.join()
+    assert in_time == [True]
+    assert multiprocessing.active_children() == []
 
 
 @pytest.mark.slow

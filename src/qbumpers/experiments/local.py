@@ -1,19 +1,16 @@
 """Cells on this machine: threads where compiled loops let each other run, else processes."""
 
-import contextlib
 import itertools
 import os
-import signal
-from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Generator, Iterable
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import resource_tracker
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
-from qbumpers.simulation import make_pool
+from qbumpers.simulation.workers import make_pool, some_finished, submit
 
 
 class ThisMachine:
@@ -46,44 +43,19 @@ class ThisMachine:
         """
         remaining: Iterable[Cell] = iter(seconds)
         waiting: set[Future[Finished]] = set()
-        pool = make_pool(plan.task, min(self.cores, max(1, len(seconds))))
         try:
-            while True:
-                # Few at a time, so that little is thrown away when the run is stopped.
-                for cell in itertools.islice(remaining, 2 * self.cores - len(waiting)):
-                    condition = plan.conditions[cell.content]
-                    with _interrupts_later():
-                        waiting.add(pool.submit(finish, condition, cell, plan.experiment.seed))
-                if not waiting:
-                    return
-                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in done:
-                    yield future.result()
+            with make_pool(plan.task, min(self.cores, max(1, len(seconds)))) as pool:
+                while True:
+                    # Few at a time, so that little is thrown away when the run is stopped.
+                    for cell in itertools.islice(remaining, 2 * self.cores - len(waiting)):
+                        condition = plan.conditions[cell.content]
+                        waiting.add(submit(pool, finish, condition, cell, plan.experiment.seed))
+                    if not waiting:
+                        return
+                    done, waiting = some_finished(waiting)
+                    for future in done:
+                        yield future.result()
         except BrokenProcessPool as error:
             raise ChildProcessError(
                 "a worker process was lost; was it killed, or is memory short?"
             ) from error
-        finally:
-            _stop(pool)
-
-
-@contextlib.contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Ctrl-C waits until the end of the block, and processes begun within it never hear it."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    resource_tracker.ensure_running()  # it unblocks the signal when it begins
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _stop(pool: Executor) -> None:
-    """End a pool without waiting for what it has begun; its threads go on, its processes end."""
-    processes = list((getattr(pool, "_processes", None) or {}).values())
-    for process in processes:
-        process.terminate()
-    pool.shutdown(wait=bool(processes), cancel_futures=True)  # at once, and nothing is left over

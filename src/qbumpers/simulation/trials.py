@@ -11,7 +11,7 @@ from qbumpers.learners import DoubleDQN, QLearner
 from qbumpers.simulation import deep, tabular
 from qbumpers.simulation.condition import Condition, make_condition
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
-from qbumpers.simulation.workers import make_pool
+from qbumpers.simulation.workers import make_pool, some_finished, submit
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import QValues
 
@@ -82,8 +82,13 @@ def run(
     if len(ranges) == 1:
         return _run_block(condition, ranges[0], seed)
     with make_pool(condition.task, workers) as pool:
-        blocks = pool.map(_run_block, *zip(*((condition, r, seed) for r in ranges), strict=True))
-        return _joined(list(blocks))
+        blocks = [submit(pool, _run_block, condition, each, seed) for each in ranges]
+        waiting = set(blocks)
+        while waiting:
+            done, waiting = some_finished(waiting)
+            for block in done:
+                block.result()  # raises at once what went wrong
+        return _joined([block.result() for block in blocks])
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
