@@ -17,11 +17,12 @@ import numpy as np
 from measuring import Row, Target, Timed, alternate, compared, is_quick, show
 
 from qbumpers.assistants import make_assistant
-from qbumpers.learners import DoubleDQN, Network, Schedule
+from qbumpers.learners import DoubleDQN, Schedule
+from qbumpers.networks import Network
 from qbumpers.simulation import Condition, make_condition, run
 from qbumpers.simulation.workers import make_pool
 from qbumpers.tasks import VectorTask, make_task
-from qbumpers.tasks.lander import Lander
+from qbumpers.tasks.lunar_lander.stepper import Lander
 from qbumpers.values import NetworkValues
 
 SEED = 0  # of the terrain; Gymnasium's environment can have it too

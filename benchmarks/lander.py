@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.envs.box2d.lunar_lander import LunarLander, heuristic
 from measuring import Row, Timed, alternate, compared, is_quick, show
 
-from qbumpers.tasks.lander import Lander
+from qbumpers.tasks.lunar_lander.stepper import Lander
 
 SEED = 0
 UNIT = "us"

@@ -34,8 +34,8 @@ from qbumpers.analysis.keeping import (
     write_numbers,
 )
 from qbumpers.analysis.page.headlines import told
+from qbumpers.experts.quality import check_values, summarise
 from qbumpers.values import NetworkValues, load_values
-from qbumpers.values.quality import check_values, summarise
 
 _COLOURS = 48  # bands that overlap make many, and large files
 

@@ -13,8 +13,8 @@ import tomli_w
 
 from qbumpers import make_task
 from qbumpers.experiments.sources import profiles, reproduction
+from qbumpers.experts.choosing import best, judge
 from qbumpers.values import NetworkValues, load_values
-from qbumpers.values.selection import best, judge
 
 TASK = "lunar-lander"
 MAIN, SECOND, CORRECTED = "full", "second-expert", "corrected-values"

@@ -18,6 +18,6 @@ gymnasium.register(
 )
 gymnasium.register(
     id="qbumpers/LunarLander-v0",
-    entry_point="qbumpers.tasks.lunar_lander:LunarLander",
+    entry_point="qbumpers.tasks.lunar_lander.environment:LunarLander",
     max_episode_steps=1000,
 )

@@ -2,7 +2,9 @@ from .assistants import Assistant, make_assistant, register_assistant
 from .decisions import Decision, Noise, Situation, Step
 from .errors import RequestError
 from .experiments.store import load
-from .learners import DoubleDQN, Network, QLearner, Schedule
+from .experts import train_expert
+from .learners import DoubleDQN, QLearner, Schedule
+from .networks import Network
 from .shared_control import SharedControl
 from .simulation import Simulation, simulate
 from .tasks import TabularTask, VectorTask, make_task, register_task
@@ -14,7 +16,6 @@ from .values import (
     load_values,
     shipped_expert,
     solve,
-    train_expert,
 )
 
 __version__: str

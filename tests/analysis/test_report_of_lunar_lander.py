@@ -23,7 +23,7 @@ from qbumpers.analysis.measures import trial_measures
 from qbumpers.analysis.report import find, write_report
 from qbumpers.errors import RequestError
 from qbumpers.experiments.store import load
-from qbumpers.values import experts
+from qbumpers.values import shipped
 from tests.analysis.landings import made_up
 from tests.analysis.pages import Page
 
@@ -226,14 +226,14 @@ def claims_that(exceed, episodes=6):
 
 
 def test_q_values_are_checked_kept_and_told(kept, write_page, monkeypatch, tmp_path):
-    shipped = Path(experts.__file__).parent / "built_in" / "lunar-lander.npz"
+    file = Path(shipped.__file__).parent / "built_in" / "lunar-lander.npz"
     excesses = iter([20.0, -5.0])
     monkeypatch.setattr(
         importlib.import_module("make_lunar_lander"),
         "check_values",
         lambda task, values, *, discount: claims_that(next(excesses)),
     )
-    asked = ["--quality", f"expert={shipped}", f"a=second={shipped}"]
+    asked = ["--quality", f"expert={file}", f"a=second={file}"]
     text, drawn = write_page(tmp_path / "page", "--data", str(kept), *asked)
     table = pl.read_csv(kept / "quality.csv")
     assert table.height == 2 * (6 + 6 * 3)  # of greedy episodes, only their start

@@ -4,8 +4,9 @@ import pytest
 
 from qbumpers import load_values, solve
 from qbumpers.cli import expert as command
+from qbumpers.experts import correcting, visiting
 from qbumpers.tasks import make_task
-from qbumpers.values import TabularValues, evaluation, visiting
+from qbumpers.values import TabularValues
 from tests.values.networks import constant, network_of
 
 POLE = ("CartPole-v1", "--discount", "0.9")
@@ -70,8 +71,8 @@ def test_a_file_is_checked_and_drawn(call, pole, tmp_path):
 
 def test_values_are_corrected_into_another_file(call, pole, monkeypatch):
     monkeypatch.setattr(visiting, "_EPISODES", 10)
-    monkeypatch.setattr(evaluation, "_UPDATES", 300)
-    monkeypatch.setattr(evaluation, "BRANCHES", 60)
+    monkeypatch.setattr(correcting, "_UPDATES", 300)
+    monkeypatch.setattr(correcting, "BRANCHES", 60)
     status, output, _ = call("expert", *POLE, "--check", "pole.npz", "--corrected", "mended.npz")
     assert status == 0
     assert "In states held out the error was" in output
@@ -124,20 +125,20 @@ def test_the_help_states_the_rule_of_choice(call):
 
 
 def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_path):
-    from qbumpers.values import selection
+    from qbumpers.experts import choosing
 
-    original = selection.train_expert
+    original = choosing.train_expert
 
     def stopped(*arguments, seed, **fields):
         if seed == 1:
             raise RuntimeError("the lights went out")
         return original(*arguments, seed=seed, **fields)
 
-    monkeypatch.setattr(selection, "train_expert", stopped)
+    monkeypatch.setattr(choosing, "train_expert", stopped)
     assert call("expert", *QUICK)[0] == 1
     [kept] = (tmp_path / "CartPole-v1.npz.work").iterdir()
     before = kept.stat().st_mtime_ns
-    monkeypatch.setattr(selection, "train_expert", original)
+    monkeypatch.setattr(choosing, "train_expert", original)
     assert call("expert", *QUICK)[0] == 0
     assert kept.stat().st_mtime_ns == before
     assert load_values("CartPole-v1.npz").inputs == 4

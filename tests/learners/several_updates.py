@@ -4,8 +4,9 @@ import hashlib
 
 import numpy as np
 
-from qbumpers.learners import DoubleDQN, Network
+from qbumpers.learners import DoubleDQN
 from qbumpers.learners.double_dqn import make_brain, rates, update
+from qbumpers.networks import Network
 from qbumpers.random_streams import LEARNER, trial_streams
 
 INPUTS, ACTIONS, UPDATES = 8, 4, 200

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from qbumpers.errors import RequestError, checked
-from qbumpers.learners import DoubleDQN, Network
+from qbumpers.learners import DoubleDQN
 from qbumpers.learners.double_dqn import (
     learn,
     loss_gradient,
@@ -14,8 +14,9 @@ from qbumpers.learners.double_dqn import (
     remember,
     update,
 )
-from qbumpers.learners.lanes import multiply_add
-from qbumpers.learners.network import named_parameters
+from qbumpers.networks import Network
+from qbumpers.networks.network import named_parameters
+from qbumpers.networks.simd import multiply_add
 from qbumpers.random_streams import LEARNER, draw, trial_streams
 from tests.learners.textbook import TextbookLearner, double_dqn_loss, transitions
 

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from qbumpers.learners.network import named_parameters
+from qbumpers.networks.network import named_parameters
 
 ACTIVATIONS = {"tanh": torch.tanh, "relu": torch.relu}
 

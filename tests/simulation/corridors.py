@@ -5,7 +5,8 @@ import functools
 import numpy as np
 
 from qbumpers.assistants import make_assistant
-from qbumpers.learners import DoubleDQN, Network
+from qbumpers.learners import DoubleDQN
+from qbumpers.networks import Network
 from qbumpers.simulation import make_condition
 from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED

@@ -11,7 +11,7 @@ from qbumpers.decisions import Noise, Situation
 from qbumpers.errors import RequestError
 from qbumpers.learners import PERCEPTIONS, QLearner, Schedule
 from qbumpers.learners.double_dqn import make_brain
-from qbumpers.learners.network import named_parameters
+from qbumpers.networks.network import named_parameters
 from qbumpers.random_streams import ASSISTANT, ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
 from qbumpers.simulation import Script, record, run, simulate
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED

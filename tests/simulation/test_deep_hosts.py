@@ -6,7 +6,8 @@ import pytest
 
 from qbumpers import SharedControl, make_task, shipped_expert
 from qbumpers.assistants import make_assistant
-from qbumpers.learners import DoubleDQN, Network, Schedule
+from qbumpers.learners import DoubleDQN, Schedule
+from qbumpers.networks import Network
 from qbumpers.simulation import make_condition, record, run
 from qbumpers.values import NetworkValues
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from qbumpers.learners import Network
+from qbumpers.networks import Network
 from qbumpers.values import NetworkValues
 
 

@@ -9,8 +9,8 @@ import pytest
 
 import qbumpers
 from qbumpers import RequestError, load_values
-from qbumpers.learners import Network
-from qbumpers.learners.network import named_parameters
+from qbumpers.networks import Network
+from qbumpers.networks.network import named_parameters
 from qbumpers.values import NetworkValues
 from tests.values.networks import network_of
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import qbumpers
-from qbumpers.values import Recipe, shipped_expert, train_expert
+from qbumpers.experts import Recipe, train_expert
+from qbumpers.values import shipped_expert
 
 LANDER = "qbumpers/LunarLander-v0"
 

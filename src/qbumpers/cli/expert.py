@@ -16,11 +16,12 @@ from qbumpers.errors import RequestError
 if TYPE_CHECKING:
     import polars as pl
 
+    from qbumpers.experts import Recipe
+    from qbumpers.experts.checking import Estimate
+    from qbumpers.experts.choosing import Judgement
     from qbumpers.tasks import TabularTask, Task
     from qbumpers.tasks.vector import VectorTask
-    from qbumpers.values import NetworkValues, Recipe, TabularValues
-    from qbumpers.values.experts import Estimate
-    from qbumpers.values.selection import Judgement
+    from qbumpers.values import NetworkValues, TabularValues
 
 
 @application.command()
@@ -97,7 +98,7 @@ def _recipe(
     task: "VectorTask", steps: int, activation: str, hidden: str, rate: float, opening: int
 ) -> "Recipe":
     from qbumpers.errors import checked
-    from qbumpers.values import Recipe
+    from qbumpers.experts import Recipe
 
     try:
         sizes = tuple(int(size) for size in hidden.split(",") if size)
@@ -115,7 +116,7 @@ def _recipe(
 
 
 def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
-    from qbumpers.values.selection import best, judge, train_several, with_record
+    from qbumpers.experts.choosing import best, judge, train_several, with_record
 
     work = path.with_name(f"{path.name}.work")
     with _steps_bar() as bar:
@@ -148,8 +149,8 @@ def _steps_bar() -> Progress:
 
 def warn_of_bad_values(task: "Task", values: "TabularValues | NetworkValues") -> None:
     """Say so where a network's values are no better than random play."""
+    from qbumpers.experts import ExpertWarning, check_expert
     from qbumpers.tasks import TabularTask
-    from qbumpers.values import ExpertWarning, check_expert
 
     if isinstance(task, TabularTask):
         return
@@ -185,8 +186,8 @@ def _number(found: "Estimate", digits: int) -> str:
 
 
 def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
-    from qbumpers.values.quality import check_values, summarise
-    from qbumpers.values.selection import judge
+    from qbumpers.experts.choosing import judge
+    from qbumpers.experts.quality import check_values, summarise
 
     values = _network_of(task, path)
     OUTPUT.print(f"[bold]{escape(str(path))}[/bold]: {escape(values.method)}", soft_wrap=True)
@@ -214,15 +215,15 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
 
 
 def _correct(task: "VectorTask", path: Path, out: Path) -> None:
-    from qbumpers.values import evaluation
+    from qbumpers.experts import correcting
 
     values = _network_of(task, path)
     with _steps_bar() as bar:
-        shown = bar.add_task("trying actions where learners go", total=evaluation.BRANCHES)
-        found = evaluation.evaluated(
+        shown = bar.add_task("trying actions where learners go", total=correcting.BRANCHES)
+        found = correcting.evaluated(
             task,
             values,
-            branches=evaluation.BRANCHES,
+            branches=correcting.BRANCHES,
             report=lambda done: bar.update(shown, completed=done),
         )
     found.values.save(out)
@@ -270,8 +271,8 @@ def _expert_of_table(
 ) -> None:
     import numpy as np
 
+    from qbumpers.experts.quality import check_table
     from qbumpers.values import TabularValues, load_values, solve
-    from qbumpers.values.quality import check_table
 
     if figures is not None:
         raise RequestError(f"--figures {figures}: a table needs none, it is compared exactly")

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from qbumpers.learners import DoubleDQN, Network, QLearner, Schedule
+from qbumpers.learners import DoubleDQN, QLearner, Schedule
+from qbumpers.networks import Network
 from qbumpers.tasks import TabularTask, Task
 
 Discount = Annotated[float, Field(gt=0, le=1)]

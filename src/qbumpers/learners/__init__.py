@@ -1,7 +1,6 @@
 """Simulated people: what they do, what they believe happened, how they learn from it."""
 
 from qbumpers.learners.double_dqn import DoubleDQN
-from qbumpers.learners.network import Network
 from qbumpers.learners.perception import PERCEPTIONS, Experience, Perception, perceive, perception
 from qbumpers.learners.q_learning import QLearner, Schedule
 
@@ -9,7 +8,6 @@ __all__ = [
     "PERCEPTIONS",
     "DoubleDQN",
     "Experience",
-    "Network",
     "Perception",
     "QLearner",
     "Schedule",

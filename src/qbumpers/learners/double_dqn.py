@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.compilation import compiled, compiled_apart
-from qbumpers.learners.lanes import multiply_add, sum_of_squares
-from qbumpers.learners.network import Layout, Network, backward, forward, initialise
 from qbumpers.learners.q_learning import Schedule
+from qbumpers.networks.network import Layout, Network, backward, forward, initialise
+from qbumpers.networks.simd import multiply_add, sum_of_squares
 from qbumpers.random_streams import draw
 
 Count = Annotated[int, Field(ge=1)]

@@ -12,9 +12,9 @@ from qbumpers.choice import best_value
 from qbumpers.compilation import compiled_apart
 from qbumpers.decisions import Noise, Situation, Step, projected_return
 from qbumpers.learners.double_dqn import Brain, Rates, learn, remember
-from qbumpers.learners.network import Layout, values_of
 from qbumpers.learners.perception import Perception, perceive
 from qbumpers.learners.q_learning import choose, choose_greedily
+from qbumpers.networks.network import Layout, values_of
 from qbumpers.random_streams import ASSISTANT, LEARNER, draw
 from qbumpers.tasks.dynamics import TERMINATED, finite
 

@@ -17,7 +17,7 @@ Task = TabularTask | VectorTask
 
 
 def _lunar_lander(seed: int | None = None) -> VectorTask:
-    from qbumpers.tasks.lander import lunar_lander  # Box2D loads when it is used
+    from qbumpers.tasks.lunar_lander.stepper import lunar_lander  # Box2D loads when it is used
 
     return lunar_lander(seed)
 

@@ -13,7 +13,7 @@ import numpy as np
 import qbumpers
 from qbumpers.errors import RequestError, checked
 from qbumpers.files import write_atomically
-from qbumpers.learners.network import Layout, Network, forward, named_parameters
+from qbumpers.networks.network import Layout, Network, forward, named_parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class NetworkValues:
         network: shape of the network.
         inputs: D, numbers of an observation.
         actions: A.
-        parameters: float32 [P], laid out as `qbumpers.learners.network` says, read-only.
+        parameters: float32 [P], laid out as `qbumpers.networks.network` says, read-only.
         discount: of the values.
         task: name of the task.
         method: how they were made, in words.
@@ -121,7 +121,7 @@ def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) ->
     """Values from the arrays and the provenance of a file that `NetworkValues.save` wrote.
 
     Args:
-        arrays: by name, see `qbumpers.learners.network.named_parameters`.
+        arrays: by name, see `qbumpers.networks.network.named_parameters`.
         provenance: without the hash.
 
     Returns:

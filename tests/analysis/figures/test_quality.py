@@ -6,7 +6,7 @@ import pytest
 
 from qbumpers.analysis.figures.quality import quality_figure
 from qbumpers.analysis.figures.style import save
-from qbumpers.values.quality import BEFORE_CRASH, check_values
+from qbumpers.experts.quality import BEFORE_CRASH, check_values
 from tests.values.walking import DISCOUNT, GOAL, exact, flattering, line, random_policy
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from qbumpers.analysis.figures.style import figure
-from qbumpers.values.quality import BEFORE_CRASH, bias_by
+from qbumpers.experts.quality import BEFORE_CRASH, bias_by
 
 _COLOURS = ("#0072b2", "#d55e00")
 _MARKERS = ("o", "^")
@@ -19,7 +19,7 @@ def quality_figure(claims: Sequence[tuple[str, pl.DataFrame]]) -> Figure:
     """Calibration, bias before crashes, and bias by distance from the expert's path.
 
     Args:
-        claims: one or two sets with their names, from `qbumpers.values.quality.check_values`.
+        claims: one or two sets with their names, from `qbumpers.experts.quality.check_values`.
 
     Returns:
         The figure; bars are 95% intervals over episodes.

@@ -1,0 +1,141 @@
+"""Several experts trained alike, judged by a rule fixed beforehand, and the best of them kept."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from qbumpers.errors import RequestError
+from qbumpers.experts.checking import Estimate, estimate
+from qbumpers.experts.episodes import Episode, discounted_return, play_several
+from qbumpers.experts.training import Recipe, train_expert
+from qbumpers.random_streams import content_digest
+from qbumpers.tasks.vector import VectorTask
+from qbumpers.values.network import NetworkValues
+from qbumpers.values.tabular import load_values
+
+SETTINGS = ((0.02, 0), (0.1, 0), (0.02, 50))
+"""Probability of a random action and random opening actions of the episodes that judge, in turn."""
+
+EPISODES = 100
+"""Of each setting."""
+
+
+class Judgement(NamedTuple):
+    """How an expert fares.
+
+    Attributes:
+        merits: in the episodes of each of `SETTINGS`, the share of successes, or the mean return
+            where the task tells no success.
+        greedy_return: undiscounted, of greedy episodes.
+        start_value: V(s_0).
+        start_return: discounted return of greedy episodes.
+        crash_value: mean Q of the action that crashed, in the episodes that judge; None where
+            nothing crashed.
+    """
+
+    merits: tuple[Estimate, ...]
+    greedy_return: Estimate
+    start_value: Estimate
+    start_return: Estimate
+    crash_value: Estimate | None
+
+
+def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
+    """Judge an expert.
+
+    Args:
+        task: the task.
+        values: of the expert.
+        episodes: of each setting, at least 1.
+
+    Returns:
+        The judgement; equal values are judged alike.
+    """
+    played = [
+        play_several(task, values, episodes, epsilon=epsilon, opening=opening)
+        for epsilon, opening in SETTINGS
+    ]
+    plain = play_several(task, values, min(10, episodes))
+    crashes = [episode for several in played for episode in several if episode.crash]
+    returns = [discounted_return(episode.rewards, values.discount) for episode in plain]
+    return Judgement(
+        merits=tuple(_merit(task, several) for several in played),
+        greedy_return=estimate(np.array([episode.rewards.sum() for episode in plain])),
+        start_value=estimate(np.array([values(e.observations[0]).max() for e in plain])),
+        start_return=estimate(np.array(returns)),
+        crash_value=_last_value(values, crashes) if crashes else None,
+    )
+
+
+def _merit(task: VectorTask, episodes: Iterable[Episode]) -> Estimate:
+    if task.has_success:
+        return estimate(np.array([float(episode.success) for episode in episodes]))
+    return estimate(np.array([episode.rewards.sum() for episode in episodes]))
+
+
+def _last_value(values: NetworkValues, episodes: Iterable[Episode]) -> Estimate:
+    last = [values(episode.observations[-2])[episode.actions[-1]] for episode in episodes]
+    return estimate(np.array(last))
+
+
+def best(judgements: Sequence[Judgement]) -> int:
+    """Place of the best: by the first merit, among equals by the second, then by the third."""
+    merits = [tuple(merit.mean for merit in judgement.merits) for judgement in judgements]
+    return merits.index(max(merits))
+
+
+def train_several(
+    task: VectorTask,
+    recipe: Recipe,
+    seeds: Iterable[int],
+    folder: Path,
+    report: Callable[[int, int], None] = lambda seed, steps: None,
+) -> list[NetworkValues]:
+    """Train an expert with each of several seeds; finished ones are kept and not trained again.
+
+    Args:
+        task: the task.
+        recipe: of all of them.
+        seeds: of the random numbers, not negative.
+        folder: where each is kept.
+        report: called with a seed and its steps done.
+
+    Returns:
+        The experts, in the order of the seeds.
+
+    Raises:
+        RequestError: as `train_expert`, and where a kept file is damaged.
+    """
+    experts = []
+    for seed in seeds:
+        content = content_digest([task.digest(), recipe.words(seed)]).hex()
+        path = folder / f"seed-{seed}-{content[:12]}.npz"
+        if not path.exists():
+
+            def tell(steps: int, seed: int = seed) -> None:
+                report(seed, steps)
+
+            train_expert(task, recipe, seed=seed, report=tell).save(path)
+        values = load_values(path)
+        if not isinstance(values, NetworkValues):
+            raise RequestError(f"{path}: a table of values; delete it, it is not of this training")
+        experts.append(values)
+        report(seed, recipe.steps)
+    return experts
+
+
+def with_record(
+    task: VectorTask, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
+) -> NetworkValues:
+    """The same values, with how they were chosen and what they reach in their provenance."""
+    kind = "success" if task.has_success else "return"
+    reached = ", ".join(
+        f"{merit.mean:.2f} at epsilon {epsilon:g}"
+        + (f" after {opening} random actions" if opening else "")
+        for merit, (epsilon, opening) in zip(judgement.merits, SETTINGS, strict=True)
+    )
+    chosen = f"the best of seeds {', '.join(map(str, seeds))}; " if len(seeds) > 1 else ""
+    return replace(values, method=f"{values.method}; {chosen}{kind} {reached}")

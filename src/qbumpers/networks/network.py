@@ -1,0 +1,276 @@
+"""Multi-layer perceptrons in compiled code: action values of one state or a batch, and gradients.
+
+All parameters of a network lie in one flat array, layer after layer, weights [inputs, outputs] and
+then biases [outputs], so that an optimiser is one loop over it. A dueling network (Wang et al.
+2016) ends in four layers: value units, value, advantage units, advantages.
+"""
+
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.networks.layers import (
+    activate,
+    add_biases,
+    derive,
+    gradient_of_layer,
+    matrix,
+    pass_down,
+    weighted_sums,
+)
+from qbumpers.networks.simd import multiply, transposed
+from qbumpers.random_streams import draw
+
+
+class Network(NamedTuple):
+    """The shape of a network.
+
+    Attributes:
+        hidden: units of each hidden layer.
+        activation: of hidden units, "tanh" or "relu".
+        dueling: units of each of the two streams of a dueling network; 0 for a plain one.
+    """
+
+    hidden: tuple[Annotated[int, Field(ge=1, le=4096)], ...] = (64, 64)
+    activation: Literal["tanh", "relu"] = "tanh"
+    dueling: Annotated[int, Field(ge=0, le=4096)] = 0
+
+    def layout(self, inputs: int, actions: int) -> "Layout":
+        """The network laid out between so many inputs and actions."""
+        return Layout((inputs, *self.hidden), actions, self.dueling, self.activation == "relu")
+
+
+class Layout(NamedTuple):
+    """A network as compiled code needs it.
+
+    Attributes:
+        sizes: inputs, then units of each hidden layer.
+        actions: A.
+        dueling: units of each stream of a dueling network, or 0.
+        relu: rectified linear units instead of tanh.
+    """
+
+    sizes: tuple[int, ...]
+    actions: int
+    dueling: int
+    relu: bool
+
+    def layers(self) -> list[tuple[str, int, int]]:
+        """Name, outputs and inputs of each layer, in the order of their parameters."""
+        sizes, last = self.sizes, self.sizes[-1]
+        layers = [(f"hidden_{i}", sizes[i], sizes[i - 1]) for i in range(1, len(sizes))]
+        if not self.dueling:
+            return [*layers, ("values", self.actions, last)]
+        return [
+            *layers,
+            ("value_units", self.dueling, last),
+            ("value", 1, self.dueling),
+            ("advantage_units", self.dueling, last),
+            ("advantages", self.actions, self.dueling),
+        ]
+
+    def parameters(self) -> int:
+        """How many numbers the network has."""
+        return sum(outputs * (inputs + 1) for _, outputs, inputs in self.layers())
+
+    def room(self, states: int) -> int:
+        """How many numbers `forward` needs for a batch of states."""
+        heads = 2 * self.dueling + 1 + self.actions if self.dueling else self.actions
+        return states * (sum(self.sizes) + heads)
+
+
+def named_parameters(layout: Layout, parameters: np.ndarray) -> dict[str, np.ndarray]:
+    """The parameters by name, as views: "hidden_1.weight" [inputs, outputs], "hidden_1.bias", ...
+
+    Args:
+        layout: of the network.
+        parameters: float [P], flat.
+
+    Returns:
+        Views of `parameters`.
+    """
+    named, place = {}, 0
+    for name, outputs, inputs in layout.layers():
+        end = place + outputs * inputs
+        named[f"{name}.weight"] = parameters[place:end].reshape(inputs, outputs)
+        named[f"{name}.bias"] = parameters[end : end + outputs]
+        place = end + outputs
+    return named
+
+
+def initialise(layout: Layout, parameters: np.ndarray, stream: np.ndarray) -> None:
+    """Weights uniform in +-sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), biases 0.
+
+    Args:
+        layout: of the network.
+        parameters: float [P], overwritten.
+        stream: uint64 [4], see `qbumpers.random_streams`.
+    """
+    place = 0
+    for _, outputs, inputs in layout.layers():
+        _spread(parameters[place : place + outputs * inputs], outputs + inputs, stream)
+        place += outputs * inputs
+        parameters[place : place + outputs] = 0
+        place += outputs
+
+
+@compiled_apart
+def _spread(weights: np.ndarray, connections: int, stream: np.ndarray) -> None:
+    limit = np.sqrt(6 / connections)
+    for i in range(len(weights)):
+        weights[i] = limit * (2 * draw(stream) - 1)
+
+
+@compiled_apart
+def forward(layout: Layout, parameters: np.ndarray, room: np.ndarray, states: int) -> np.ndarray:
+    """Action values of a batch of states.
+
+    Args:
+        layout: of the network.
+        parameters: float [P].
+        room: float [`layout.room(states)` or more]; its first numbers are the observations
+            [states, inputs], what follows is overwritten, for `backward`.
+        states: N.
+
+    Returns:
+        float [N, A], a view of `room`.
+    """
+    sizes, actions, streams, relu = layout
+    place, first = 0, 0
+    below = matrix(room, 0, states, sizes[0])
+    for layer in range(1, len(sizes)):
+        first += below.size
+        units = matrix(room, first, states, sizes[layer])
+        activate(units, weighted_sums(parameters, place, below, units), relu)
+        place += units.shape[1] * (below.shape[1] + 1)
+        below = units
+    first += below.size
+    if streams == 0:
+        values = matrix(room, first, states, actions)
+        add_biases(values, weighted_sums(parameters, place, below, values))
+        return values
+    value_units, value, advantage_units, values = _heads(room, first, states, streams, actions)
+    activate(value_units, weighted_sums(parameters, place, below, value_units), relu)
+    place += streams * (below.shape[1] + 1)
+    add_biases(value, weighted_sums(parameters, place, value_units, value))
+    place += streams + 1
+    activate(advantage_units, weighted_sums(parameters, place, below, advantage_units), relu)
+    place += streams * (below.shape[1] + 1)
+    add_biases(values, weighted_sums(parameters, place, advantage_units, values))
+    for n in range(states):
+        mean = values[n].sum() / values.dtype.type(actions)
+        for action in range(actions):
+            values[n, action] += value[n, 0] - mean
+    return values
+
+
+@compiled_apart
+def values_of(network: tuple[Any, ...], observation: np.ndarray) -> np.ndarray:
+    """Action values of one observation.
+
+    Args:
+        network: its layout as a plain tuple, its parameters, and room for one state.
+        observation: float [D].
+
+    Returns:
+        float [A], a view of the room.
+    """
+    layout, parameters, room = network
+    for i in range(len(observation)):
+        room[i] = observation[i]
+    return forward(Layout(*layout), parameters, room, 1)[0]
+
+
+@compiled
+def _heads(room: np.ndarray, first: int, states: int, streams: int, actions: int) -> Any:
+    """Where the layers of a dueling network lie."""
+    second = first + states * streams
+    third = second + states
+    fourth = third + states * streams
+    return (
+        matrix(room, first, states, streams),
+        matrix(room, second, states, 1),
+        matrix(room, third, states, streams),
+        matrix(room, fourth, states, actions),
+    )
+
+
+@compiled_apart
+def backward(
+    layout: Layout, parameters: np.ndarray, room: np.ndarray, deltas: np.ndarray,
+    spare: np.ndarray, gradient: np.ndarray,
+) -> None:  # fmt: skip
+    """The gradient of a loss, by back-propagation.
+
+    Args:
+        layout: of the network.
+        parameters: float [P].
+        room: as `forward` left it.
+        deltas: float [N, A], derivatives of the loss by the action values.
+        spare: float [`layout.room(N)`], overwritten.
+        gradient: float [P], overwritten.
+    """
+    sizes, _, streams, relu = layout
+    states = deltas.shape[0]
+    first, place = 0, 0  # of the last hidden layer, and of the parameters after it
+    for layer in range(1, len(sizes)):
+        first += states * sizes[layer - 1]
+        place += sizes[layer] * (sizes[layer - 1] + 1)
+    last = sizes[len(sizes) - 1]
+    units = matrix(room, first, states, last)
+    below = matrix(spare, first, states, last)
+    if streams == 0:
+        gradient_of_layer(gradient, place, units, deltas)
+        if len(sizes) > 1:
+            pass_down(parameters, place, deltas, units, relu, below)
+    else:
+        _backward_heads(
+            layout, parameters, room, deltas, spare, gradient, place, first, units, below
+        )
+    for layer in range(len(sizes) - 1, 0, -1):
+        place -= sizes[layer] * (sizes[layer - 1] + 1)
+        above = below
+        first -= states * sizes[layer - 1]
+        units = matrix(room, first, states, sizes[layer - 1])
+        gradient_of_layer(gradient, place, units, above)
+        if layer > 1:
+            below = matrix(spare, first, states, sizes[layer - 1])
+            pass_down(parameters, place, above, units, relu, below)
+
+
+@compiled_apart
+def _backward_heads(
+    layout, parameters, room, deltas, spare, gradient, place, first, units, below
+):  # fmt: skip
+    """The last four layers of a dueling network, down to the deltas `below` of its trunk."""
+    sizes, actions, streams, relu = layout
+    states, last = units.shape
+    first += units.size
+    value_units, _, advantage_units, _ = _heads(room, first, states, streams, actions)
+    value_down, value, advantage_down, advantages = _heads(spare, first, states, streams, actions)
+    for n in range(states):
+        total = deltas[n].sum()
+        value[n, 0] = total
+        for action in range(actions):
+            advantages[n, action] = deltas[n, action] - total / deltas.dtype.type(actions)
+    value_place = place + streams * (last + 1)
+    advantage_place = value_place + streams + 1
+    advantages_place = advantage_place + streams * (last + 1)
+    gradient_of_layer(gradient, value_place, value_units, value)
+    pass_down(parameters, value_place, value, value_units, relu, value_down)
+    gradient_of_layer(gradient, place, units, value_down)
+    gradient_of_layer(gradient, advantages_place, advantage_units, advantages)
+    pass_down(parameters, advantages_place, advantages, advantage_units, relu, advantage_down)
+    gradient_of_layer(gradient, advantage_place, units, advantage_down)
+    if len(sizes) > 1:
+        weights = matrix(parameters, place, last, streams)
+        multiply(value_down, False, transposed(weights), below)
+        weights = matrix(parameters, advantage_place, last, streams)
+        sums = np.empty_like(below)
+        multiply(advantage_down, False, transposed(weights), sums)
+        for n in range(states):
+            for i in range(last):
+                below[n, i] += sums[n, i]
+        derive(below, units, relu)

@@ -1,0 +1,1 @@
+"""Lunar Lander: its bodies, the stepper of simulators, and the environment for people."""

@@ -1,0 +1,69 @@
+"""Lunar Lander with the same terrain and noise in every episode (Section 4.3)."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+
+# First, for its message where Box2D is missing.
+from qbumpers.tasks.lunar_lander.stepper import chance_of
+
+from gymnasium.envs.box2d import lunar_lander as original  # isort: skip
+
+
+class LunarLander(original.LunarLander):
+    """Gymnasium's discrete lunar lander as `qbumpers/LunarLander-v0`, the same in every episode.
+
+    `info` of every step has `success` (it came to rest: reward 100) and `crash` (the hull touched
+    the ground or it left the picture: reward -100).
+
+    Args:
+        seed: of Gymnasium's class, at every reset; None for the paper's terrain and noise.
+        render_mode: "human", "rgb_array" or None.
+
+    Raises:
+        RequestError: where the seed is not a whole number, or negative.
+    """
+
+    def __init__(self, seed: int | None = None, render_mode: str | None = None) -> None:
+        self._terrain_seed = seed
+        self._chance = chance_of(seed)
+        super().__init__(render_mode=render_mode)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Start the episode, always the same one.
+
+        Args:
+            seed: of `np_random`, which nothing here draws from: the constructor's seed decides
+                terrain and noise.
+            options: unused.
+
+        Returns:
+            The observation, float32 [8], and `info`.
+        """
+        gymnasium.Env.reset(self, seed=seed)
+        self._chance = chance_of(self._terrain_seed)
+        with self._drawing_from_chance():
+            observation, _ = super().reset(options=options)
+        return observation, {"success": False, "crash": False}
+
+    def step(self, action: int) -> tuple[np.ndarray, float, bool, Literal[False], dict[str, Any]]:
+        """Take an action: 0 nothing, 1 left engine, 2 main engine, 3 right engine."""
+        with self._drawing_from_chance():
+            observation, reward, terminated, truncated, _ = super().step(action)
+        success = bool(terminated and reward > 0)
+        info = {"success": success, "crash": bool(terminated and not success)}
+        return observation, float(reward), terminated, truncated, info
+
+    @contextmanager
+    def _drawing_from_chance(self) -> Iterator[None]:
+        """What Gymnasium's class draws comes from the generator of terrain and noise."""
+        seeded, self._np_random = self._np_random, self._chance
+        try:
+            yield
+        finally:
+            self._np_random = seeded

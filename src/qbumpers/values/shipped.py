@@ -1,0 +1,38 @@
+"""The experts that ship with the package."""
+
+from importlib import resources
+
+from qbumpers.errors import RequestError
+from qbumpers.values.network import NetworkValues
+from qbumpers.values.tabular import decoded_values
+
+_FOLDER = resources.files("qbumpers.values").joinpath("built_in")
+
+
+def shipped_expert(task: str) -> NetworkValues:
+    """The expert that ships with the package for a task.
+
+    Args:
+        task: name of the task.
+
+    Returns:
+        Its values.
+
+    Raises:
+        RequestError: where none ships.
+    """
+    shipped = {
+        file.name.removesuffix(".npz"): file
+        for file in (_FOLDER.iterdir() if _FOLDER.is_dir() else ())
+        if file.name.endswith(".npz")
+    }
+    if task not in shipped:
+        known = ", ".join(sorted(shipped)) or "no task"
+        raise RequestError(
+            f"no expert ships for task {task!r}; they do for: {known}. Train one by "
+            f"'qbumpers expert {task}' and give its file"
+        )
+    values = decoded_values(shipped[task].read_bytes(), f"{task}.npz of the package")
+    if not isinstance(values, NetworkValues):
+        raise RequestError(f"the expert that ships for task {task!r} is a table, not a network")
+    return values

@@ -1,0 +1,72 @@
+"""The experts that ship, and a warning where values are no better than none."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from qbumpers.errors import RequestError
+from qbumpers.experts import ExpertWarning, check_expert
+from qbumpers.experts.checking import estimate
+from qbumpers.tasks import make_task
+from qbumpers.values import shipped, shipped_expert
+from tests.values.networks import constant, network_of
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(shipped, "_FOLDER", tmp_path)
+    return tmp_path
+
+
+def test_the_expert_of_a_task_is_the_file_of_its_name(folder):
+    values = network_of(task="corridor")
+    values.save(folder / "corridor.npz")
+    assert shipped_expert("corridor").digest() == values.digest()
+
+
+@pytest.mark.parametrize("name", ["CartPole-v1", "", "../built_in/corridor", "x/corridor"])
+def test_a_task_without_expert_is_told_how_to_get_one(folder, name):
+    network_of().save(folder / "corridor.npz")
+    with pytest.raises(RequestError, match=rf"'{name}'; .* for: corridor\. .*expert {name}'"):
+        shipped_expert(name)
+
+
+def test_where_none_ships_it_says_so(folder):
+    with pytest.raises(RequestError, match="they do for: no task"):
+        shipped_expert("corridor")
+
+
+def test_a_damaged_file_is_no_expert(folder):
+    (folder / "corridor.npz").write_bytes(b"garbage")
+    with pytest.raises(RequestError, match=r"corridor\.npz of the package: not a file of Q values"):
+        shipped_expert("corridor")
+
+
+def test_estimates_are_means_and_their_standard_errors():
+    numbers = np.array([1.0, 2.0, 6.0])
+    assert estimate(numbers) == pytest.approx((3.0, np.sqrt(7 / 3)))
+    assert estimate(numbers[:1]) == (1.0, np.inf)
+
+
+def upright(observation):
+    """Balances a pole for a good while: push to where it falls."""
+    return [0.0, 1.0] if observation[2] + observation[3] > 0 else [1.0, 0.0]
+
+
+def test_an_expert_that_beats_random_play_is_accepted_quietly():
+    task = make_task("CartPole-v1", discount=0.99)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = check_expert(task, upright)
+    assert found.better
+    assert found.expert.mean > 100
+    assert found.random.mean == pytest.approx(22, abs=4 * found.random.error)
+
+
+def test_an_expert_no_better_than_random_play_is_warned_of_with_what_follows():
+    task = make_task("CartPole-v1", discount=0.99)
+    with pytest.warns(ExpertWarning, match=r"CartPole-v1.*steers towards worse.*say nothing"):
+        found = check_expert(task, constant(0, 4, 2))
+    assert not found.better
+    assert found.expert.mean == pytest.approx(9.4, abs=0.5)  # it falls over as fast as it can

@@ -1,0 +1,115 @@
+"""Experts trained alike, judged by one rule, and not trained twice."""
+
+import numpy as np
+import pytest
+
+from qbumpers.errors import RequestError
+from qbumpers.experts import Recipe, choosing
+from qbumpers.experts.checking import Estimate
+from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_record
+from qbumpers.learners import DoubleDQN, Schedule
+from qbumpers.networks import Network
+from qbumpers.tasks import make_task
+from qbumpers.values import load_values
+from tests.values.networks import constant
+from tests.values.walking import DISCOUNT, line, worth
+
+RECIPE = Recipe(DoubleDQN(Network((4,)), discount=DISCOUNT, learning_starts=20), 60, 2)
+
+
+def judged(*merits):
+    nothing = Estimate(0.0, 0.0)
+    return Judgement(tuple(Estimate(m, 0.1) for m in merits), nothing, nothing, nothing, None)
+
+
+@pytest.mark.parametrize(
+    ("merits", "chosen"),
+    [
+        ([(0.9, 1, 1), (1.0, 0, 0)], 1),
+        ([(1, 0.5, 1), (1, 0.7, 0), (0.9, 1, 1)], 1),
+        ([(1, 0.7, 0.1), (1, 0.7, 0.2), (1, 0.7, 0.15)], 1),
+        ([(1, 1, 1), (1, 1, 1)], 0),
+    ],
+)
+def test_the_best_is_judged_by_one_merit_after_the_other(merits, chosen):
+    assert best([judged(*each) for each in merits]) == chosen
+
+
+def test_a_judgement_counts_successes_and_compares_claims_with_returns():
+    right = constant(1, 2, 2, discount=DISCOUNT)
+    found = judge(line(), right, episodes=30)
+    assert found.merits[0].mean == 1.0
+    assert found.merits[2].mean < 0.9  # fifty random steps often fall into the pit
+    assert found.greedy_return.mean == 10 - 4
+    assert found.start_return.mean == pytest.approx(worth(5))
+    assert found.start_value == (1.0, 0.0)
+    assert found.crash_value.mean in (0.0, 1.0) or 0 < found.crash_value.mean < 1
+
+
+def test_where_no_success_is_told_returns_judge():
+    right = constant(1, 2, 2, discount=DISCOUNT)
+    found = judge(line(has_success=False), right, episodes=10)
+    assert 5 < found.merits[0].mean <= 6
+
+
+def test_finished_seeds_are_kept_and_not_trained_again(tmp_path, monkeypatch):
+    trained = []
+    original = choosing.train_expert
+
+    def counted(*arguments, seed, **fields):
+        if seed == 2 and trained.count(2) == 0:
+            trained.append(seed)
+            raise KeyboardInterrupt
+        trained.append(seed)
+        return original(*arguments, seed=seed, **fields)
+
+    monkeypatch.setattr(choosing, "train_expert", counted)
+    with pytest.raises(KeyboardInterrupt):
+        train_several(line(), RECIPE, range(3), tmp_path)
+    steps = []
+    found = train_several(
+        line(), RECIPE, range(3), tmp_path, lambda seed, done: steps.append((seed, done))
+    )
+    assert trained == [0, 1, 2, 2]
+    assert len({values.digest() for values in found}) == 3
+    assert steps == [(0, 60), (1, 60), (2, 60)]
+    again = [original(line(), RECIPE, seed=seed).digest() for seed in range(3)]
+    assert [values.digest() for values in found] == again
+
+
+def test_another_recipe_or_task_is_another_training(tmp_path):
+    train_several(line(), RECIPE, [0], tmp_path)
+    train_several(line(), RECIPE._replace(steps=61), [0], tmp_path)
+    train_several(line(episode_limit=7), RECIPE, [0], tmp_path)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_damaged_file_is_named(tmp_path):
+    train_several(line(), RECIPE, [0], tmp_path)
+    [path] = tmp_path.iterdir()
+    path.write_bytes(b"half")
+    with pytest.raises(RequestError, match=r"seed-0-.*not a file of Q values"):
+        train_several(line(), RECIPE, [0], tmp_path)
+
+
+def test_the_provenance_says_how_it_was_chosen_and_what_it_reaches(tmp_path):
+    values = with_record(line(), constant(1, 2, 2), judged(1, 0.93, 0.5), [0, 1])
+    values.save(tmp_path / "expert.npz")
+    assert load_values(tmp_path / "expert.npz").method == (
+        "by hand; the best of seeds 0, 1; success 1.00 at epsilon 0.02, 0.93 at epsilon 0.1, "
+        "0.50 at epsilon 0.02 after 50 random actions"
+    )
+    assert np.array_equal(values.parameters, constant(1, 2, 2).parameters)
+
+
+@pytest.mark.slow
+def test_the_best_of_four_experts_balances_a_pole(tmp_path):
+    """100,000 steps each; single ones come and go, as Double DQN does at this task."""
+    task = make_task("CartPole-v1", discount=0.99)
+    learner = DoubleDQN(
+        network=Network((128,), "relu"), epsilon=Schedule(1.0, 0.02, 0.2), batch_size=128,
+        target_every=1_000,
+    )  # fmt: skip
+    trained = train_several(task, Recipe(learner, 100_000, 0), range(4), tmp_path)
+    judgements = [judge(task, values, episodes=20) for values in trained]
+    assert judgements[best(judgements)].greedy_return.mean >= 400
