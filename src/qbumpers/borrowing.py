@@ -55,6 +55,28 @@ def _uncounted(typing_context: Any, arrays: Any) -> Any:
     return arrays(arrays), generate
 
 
+def hold(arrays: Any) -> None:
+    """Keep what was borrowed alive up to here: compiled code frees an array after its last use.
+
+    Args:
+        arrays: an array, or a NamedTuple or tuple of arrays and numbers.
+    """
+
+
+@overload(hold, strict=False, jit_options=INLINE)
+def _compiled_hold(arrays: Any) -> Any:
+    used: Any = _used
+    return lambda arrays: used(arrays)
+
+
+@intrinsic
+def _used(typing_context: Any, arrays: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return context.get_dummy_value()
+
+    return types.none(arrays), generate
+
+
 def row(table: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
     """A borrowed row of a table; it must not outlive the table.
 
@@ -96,3 +118,48 @@ def _borrowed(typing_context: Any, table: Any, index: Any, width: Any) -> Any:
         return view._getvalue()
 
     return row_type(table, types.intp, width), generate
+
+
+def rows(tables: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
+    """Borrowed rows of several tables; they must not outlive the tables.
+
+    Args:
+        tables: float64 [S, K, A], C-contiguous.
+        index: in [0, S); not checked, not wrapped.
+        width: any tuple of A integers; its length tells the compiler A.
+
+    Returns:
+        The view [K, A].
+    """
+    return tables[index]
+
+
+@overload(rows, strict=False, jit_options=INLINE)
+def _compiled_rows(tables: Any, index: Any, width: Any) -> Any:
+    borrowed: Any = _borrowed_rows
+    return lambda tables, index, width: borrowed(tables, index, width)
+
+
+@intrinsic
+def _borrowed_rows(typing_context: Any, tables: Any, index: Any, width: Any) -> Any:
+    rows_type = types.Array(tables.dtype, 2, "C")
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        source = arrayobj.make_array(tables)(context, builder, arguments[0])
+        integer = context.get_value_type(types.intp)
+        size = context.get_abi_sizeof(context.get_data_type(tables.dtype))
+        height = builder.extract_value(source.shape, 1)
+        length = integer(width.count)
+        first = builder.mul(arguments[1], builder.mul(height, length))
+        view: Any = arrayobj.make_array(rows_type)(context, builder)
+        arrayobj.populate_array(
+            view,
+            data=builder.gep(source.data, [first], inbounds=True),
+            shape=cgutils.pack_array(builder, [height, length]),
+            strides=cgutils.pack_array(builder, [integer(size * width.count), integer(size)]),
+            itemsize=integer(size),
+            meminfo=None,
+        )
+        return view._getvalue()
+
+    return rows_type(tables, types.intp, width), generate

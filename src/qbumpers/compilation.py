@@ -14,6 +14,9 @@ from typing import Any, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
+from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -60,6 +63,18 @@ def compiled(function: F) -> F:
         The same function; it compiles at its first call and then runs without the GIL.
     """
     return _kept(function, INLINE)
+
+
+def inlined(function: F) -> F:
+    """Let compiled code call a function of this package as a piece of itself; Python calls it as is.
+
+    Args:
+        function: a function in Numba's subset of Python.
+
+    Returns:
+        The same function.
+    """
+    return register_jitable(**INLINE)(function)
 
 
 def compiled_apart(function: F) -> F:
@@ -124,3 +139,39 @@ def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
         The function as it was written.
     """
     return getattr(function, "py_func", function)
+
+
+CompilationError = (NumbaError, TypeError)
+"""What compiling a function raises that Numba cannot compile."""
+
+
+def type_of(value: Any) -> Any:
+    """The type that compiled code has for a value."""
+    return numba.typeof(value)
+
+
+def result_type(function: Any, *types: Any) -> Any:
+    """Compile a function for arguments of some types, without calling it.
+
+    Args:
+        function: from `compiled_for_session`.
+        *types: one per argument, see `type_of`.
+
+    Returns:
+        The type of what it returns.
+
+    Raises:
+        NumbaError: if it cannot be compiled.
+    """
+    function.compile(types)
+    return function.overloads[types].signature.return_type
+
+
+def is_compiled(function: Any) -> bool:
+    """Whether a function is one that Numba compiles."""
+    return isinstance(function, Dispatcher)
+
+
+def is_of_package(function: Any) -> bool:
+    """Whether a function is compiled and belongs to this package: kept on disk between processes."""
+    return is_compiled(function) and function.__module__.startswith("qbumpers.")

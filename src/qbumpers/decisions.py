@@ -1,32 +1,45 @@
-"""One decision of an assistant: what it knows, what chance adds, what it does, what is recorded.
+"""One decision of an assistant, its record, and the account of an episode.
 
-Every host, the Gymnasium wrapper as well as the simulator, builds the same `Situation`, draws the
-same `Noise`, calls the same rule and keeps the same `Step`.
+Every host (the Gymnasium wrapper, the simulators, a session with a person) builds the same
+`Situation`, draws the same `Noise`, calls the same rule, keeps the same `Step` and counts returns
+by the same functions: `begin`, `situate`, `checked_action`, `step_of`, `settle`.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from qbumpers.compilation import compiled
+from qbumpers.choice import best_value
+from qbumpers.compilation import compiled, inlined
+from qbumpers.errors import RequestError
 
 
 class Situation(NamedTuple):
-    """What the assistant knows at one decision.
+    """What the assistant knows at one decision. Read its fields by name: there may be more one day.
 
     Attributes:
-        values: float64 [A], Q*(s, .), the assistant's action values in the current state.
-        proposed: the person's action, in [0, A).
+        state: number of the state; the observation, float32 [D], if states are not numbered; None
+            if the host can give neither.
+        values: float64 [A], Q*(s, .), the assistant's action values. A rule may not change them.
+        others: float64 [K, A], the further rows of values that the rule named when it was
+            registered; [0, A] if it named none.
+        proposed: the action that the learner or participant proposes, in [0, A).
         earned: discounted rewards of this episode so far, sum over i < t of discount**i * r_i.
         discount: the discount of this step, gamma**t.
         start_value: V*(s_0) of this episode, in reward units.
+        episode: episodes of this learner or participant before this one.
+        step: t, steps of this episode before this one.
     """
 
+    state: Any
     values: np.ndarray
+    others: np.ndarray
     proposed: int
     earned: float
     discount: float
     start_value: float
+    episode: int
+    step: int
 
 
 class Noise(NamedTuple):
@@ -47,38 +60,94 @@ class Decision(NamedTuple):
     Attributes:
         action: the action to execute, in [0, A).
         probability: of overriding the proposed action, before the coin was tossed.
+        undo: whether the state is taken back after the action. The action happens, its reward and
+            its step count, but no end of the episode does. A compiled rule that undoes gives all
+            three fields in every return.
     """
 
     action: int
     probability: float
+    undo: bool = False
 
 
 class Step(NamedTuple):
-    """The record of one assisted step, the same from every host.
+    """The record of one assisted step, the same from every host; or, with arrays [N], a table.
 
     Attributes:
-        proposed: the person's action.
+        episode: episodes of this learner or participant before this one.
+        state: where the step began, as in `Situation`; of a table of vectors [N, D].
+        proposed: the action that the learner or participant proposed.
         executed: the action that the environment received.
-        credited: the action that the learner credits with the outcome; -1 where it learns nothing.
-        overridden: whether `executed` differs from `proposed`.
+        undone: whether the state was taken back to `state` after the action.
+        credited: the action that the learner credits with the outcome; -1 if it learns nothing.
+        overridden: whether `executed` differs from `proposed`, or the step was undone.
         probability: of an override, before the coin.
         coin: the noise that decided whether to override.
         tie: the noise that chose among equally good actions.
-        values: float64 [A], the assistant's action values in the state of the decision.
+        values: float64 [A], the assistant's action values in `state`; of a table [N, A].
         projected_return: G(s_t, proposed), see `projected_return`.
-        reward: the environment's reward for the executed action.
+        reward: of the environment for the executed action.
+        next_state: where the action led, also if the step was undone.
+        events: bits of `qbumpers.tasks.dynamics`; they tell every end of an episode, the step limit
+            included.
     """
 
-    proposed: int
-    executed: int
-    credited: int
-    overridden: bool
-    probability: float
-    coin: float
-    tie: float
+    episode: Any
+    state: Any
+    proposed: Any
+    executed: Any
+    undone: Any
+    credited: Any
+    overridden: Any
+    probability: Any
+    coin: Any
+    tie: Any
     values: np.ndarray
-    projected_return: float
-    reward: float
+    projected_return: Any
+    reward: Any
+    next_state: Any
+    events: Any
+
+
+class Model(NamedTuple):
+    """What a rule with memory may know of the task; given once, to its `start`.
+
+    Attributes:
+        states: S, numbered states; 0 if observations are vectors.
+        observation_size: D, numbers of an observation; 0 if states are numbered.
+        actions: A.
+        no_op: the action that does nothing; -1 if there is none.
+        discount: of the assistant's values.
+        dynamics: transitions of a task with a table, `qbumpers.tasks.dynamics.Dynamics`; else None.
+        distance: float64 [A, A] between actions; 0 on the diagonal and 1 elsewhere if the task
+            states none.
+    """
+
+    states: int
+    observation_size: int
+    actions: int
+    no_op: int
+    discount: float
+    dynamics: Any
+    distance: np.ndarray
+
+
+class Account(NamedTuple):
+    """What an episode has brought so far.
+
+    Attributes:
+        earned: as in `Situation`.
+        discount: as in `Situation`.
+        start_value: as in `Situation`.
+        episode: as in `Situation`.
+        step: as in `Situation`.
+    """
+
+    earned: float
+    discount: float
+    start_value: float
+    episode: int
+    step: int
 
 
 @compiled
@@ -97,3 +166,92 @@ def projected_return(earned: float, discount: float, value: float) -> float:
         The projected return, in reward units discounted to the start of the episode.
     """
     return earned + discount * value
+
+
+@inlined
+def begin(values: np.ndarray, episode: int) -> Account:
+    """The account of a new episode.
+
+    Args:
+        values: float64 [A], Q*(s_0, .).
+        episode: episodes of this learner or participant before this one.
+    """
+    return Account(0.0, 1.0, best_value(values), episode, 0)
+
+
+@inlined
+def situate(
+    account: Account, state: Any, values: np.ndarray, others: np.ndarray, proposed: int
+) -> Situation:
+    """The situation of a decision; `Situation` says what the arguments are."""
+    return Situation(
+        state, values, others, proposed, account.earned, account.discount, account.start_value,
+        account.episode, account.step,
+    )  # fmt: skip
+
+
+@inlined
+def settle(account: Account, reward: float, discount: float) -> Account:
+    """The account after a step.
+
+    Args:
+        account: before it.
+        reward: of the step.
+        discount: gamma, of the assistant's values.
+    """
+    return Account(
+        account.earned + account.discount * reward,
+        account.discount * discount,
+        account.start_value,
+        account.episode,
+        account.step + 1,
+    )
+
+
+@inlined
+def checked_action(action: int, actions: int) -> int:
+    """The action that a rule chose, if there is such an action.
+
+    Raises:
+        RequestError: if it does not lie in [0, `actions`).
+    """
+    if not 0 <= action < actions:
+        raise RequestError("the assistant's rule chose an action outside the action space")
+    return action
+
+
+class Execution(NamedTuple):
+    """What was decided and done on one step; the part of a `Step` that no environment tells.
+
+    Attributes:
+        executed: as in `Step`.
+        undone: as in `Step`.
+        probability: as in `Step`.
+    """
+
+    executed: int
+    undone: bool
+    probability: float
+
+
+@inlined
+def step_of(
+    situation: Situation,
+    noise: Noise,
+    execution: Execution,
+    credited: int,
+    reward: float,
+    next_state: Any,
+    events: int,
+) -> Step:
+    """The record of a step; `Step` says what the arguments are."""
+    overridden = execution.executed != situation.proposed or execution.undone
+    return Step(
+        situation.episode, situation.state, situation.proposed, execution.executed,
+        execution.undone, credited, overridden, execution.probability, noise.coin, noise.tie,
+        situation.values,
+        projected_return(
+            situation.earned, situation.discount, situation.values[situation.proposed]
+        ),
+        reward, next_state, events,
+    )  # fmt: skip

@@ -1,9 +1,17 @@
 """Decision rules, one file each, and the registry that names them."""
 
-from qbumpers.assistants import local_q_thresholding, maximal, none, stochastic_q_bumpers
+from qbumpers.assistants import (  # in the order in which they are listed
+    budget,
+    local_q_thresholding,
+    maximal,
+    none,
+    stochastic_q_bumpers,
+)
 from qbumpers.assistants.registry import (
     Assistant,
+    Options,
     Rule,
+    assistant_of,
     assistants,
     make_assistant,
     register_assistant,
@@ -11,8 +19,11 @@ from qbumpers.assistants.registry import (
 
 __all__ = [
     "Assistant",
+    "Options",
     "Rule",
+    "assistant_of",
     "assistants",
+    "budget",
     "local_q_thresholding",
     "make_assistant",
     "maximal",

@@ -1,58 +1,110 @@
 """The rule that options belong to, called from the loops of the simulators.
 
 Compiled loops cannot hold a registry. They choose the rule by the type of its options when they
-are compiled, so that each loop is compiled for one rule, with the rule inside it.
+are compiled, so that each loop is compiled for one rule, with the rule inside it. A rule over a
+rule calls these same functions with the options and the memory of the other.
 """
 
+import functools
 from typing import Any
 
+from numba import types
 from numba.extending import overload
 
-from qbumpers.assistants.registry import rule_for_options
-from qbumpers.compilation import INLINE
-from qbumpers.decisions import Decision, Noise, Situation, Step
+from qbumpers.assistants.registry import Rule, is_options, rule_for_options
+from qbumpers.compilation import INLINE, compiled_for_session, uncompiled
+from qbumpers.decisions import Decision, Model, Noise, Situation, Step
 
 
 def decide(situation: Situation, noise: Noise, options: Any, memory: Any) -> Decision:
     """Apply the rule that `options` belong to."""
     rule = rule_for_options(type(options))
+    function = uncompiled(rule.decide)
     if rule.start is None:
-        return rule.decide(situation, noise, options)
-    return rule.decide(situation, noise, options, memory)
+        return function(situation, noise, options)
+    return function(situation, noise, options, memory)
 
 
-def start(options: Any) -> Any:
-    """The memory of the rule before a person's first episode."""
+def start(options: Any, model: Model) -> Any:
+    """The memory of the rule before the first episode of a learner or participant."""
     rule = rule_for_options(type(options))
-    return 0 if rule.start is None else rule.start(options)
+    return 0 if rule.start is None else uncompiled(rule.start)(options, model)
 
 
 def observe(memory: Any, step: Step, options: Any) -> Any:
     """The memory of the rule after a step."""
     rule = rule_for_options(type(options))
-    return memory if rule.observe is None else rule.observe(memory, step, options)
+    return memory if rule.observe is None else uncompiled(rule.observe)(memory, step, options)
+
+
+def undoes(decision: Decision) -> bool:
+    """Whether a decision takes the state back after the action."""
+    return decision.undo
+
+
+def declined(decision: Decision, proposed: int) -> Decision:
+    """The proposed action in place of a decision, for rules over rules.
+
+    Args:
+        decision: of the rule below; in compiled code the result has as many fields.
+        proposed: the action to execute instead.
+    """
+    return Decision(proposed, 0.0)
 
 
 @overload(decide, strict=False, jit_options=INLINE)
 def _compiled_decide(situation: Any, noise: Any, options: Any, memory: Any) -> Any:
     rule = rule_for_options(options.instance_class)
-    function = rule.decide
+    function = _callable(rule, options, rule.decide)
     if rule.start is None:
         return lambda situation, noise, options, memory: function(situation, noise, options)
     return lambda situation, noise, options, memory: function(situation, noise, options, memory)
 
 
 @overload(start, strict=False, jit_options=INLINE)
-def _compiled_start(options: Any) -> Any:
-    function = rule_for_options(options.instance_class).start
-    if function is None:
-        return lambda options: 0
-    return lambda options: function(options)
+def _compiled_start(options: Any, model: Any) -> Any:
+    rule = rule_for_options(options.instance_class)
+    if rule.start is None:
+        return lambda options, model: 0
+    function = _callable(rule, options, rule.start)
+    return lambda options, model: function(options, model)
 
 
 @overload(observe, strict=False, jit_options=INLINE)
 def _compiled_observe(memory: Any, step: Any, options: Any) -> Any:
-    function = rule_for_options(options.instance_class).observe
-    if function is None:
+    rule = rule_for_options(options.instance_class)
+    if rule.observe is None:
         return lambda memory, step, options: memory
+    function = _callable(rule, options, rule.observe)
     return lambda memory, step, options: function(memory, step, options)
+
+
+@overload(undoes, strict=False, jit_options=INLINE)
+def _compiled_undoes(decision: Any) -> Any:
+    if decision.count == 3:
+        return lambda decision: decision.undo
+    return lambda decision: False
+
+
+@overload(declined, strict=False, jit_options=INLINE)
+def _compiled_declined(decision: Any, proposed: Any) -> Any:
+    if decision.count == 3:
+        return lambda decision, proposed: Decision(proposed, 0.0, False)
+    return lambda decision, proposed: Decision(proposed, 0.0)
+
+
+def _callable(rule: Rule, options: Any, function: Any) -> Any:
+    """A function of a rule; compiled for this session alone if a rule below it is the user's."""
+    if rule.built_in and not _all_built_in(options):
+        return _for_session(uncompiled(function))
+    return function
+
+
+def _all_built_in(options: Any) -> bool:
+    if not (isinstance(options, types.NamedTuple) and is_options(options.instance_class)):
+        return True
+    rule = rule_for_options(options.instance_class)
+    return rule.built_in and all(map(_all_built_in, options.types))
+
+
+_for_session = functools.lru_cache(maxsize=256)(compiled_for_session)

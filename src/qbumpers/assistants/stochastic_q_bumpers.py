@@ -79,7 +79,10 @@ def stochastic_q_bumpers(
     situation: Situation, noise: Noise, options: StochasticQBumpersOptions
 ) -> Decision:
     """Override with a probability that grows as the projected return falls (Algorithm 1)."""
-    values, proposed, earned, discount, start_value = situation
+    values, proposed = situation.values, situation.proposed
+    earned, discount, start_value = (
+        situation.earned, situation.discount, situation.start_value,
+    )  # fmt: skip
     candidate = candidate_value(values, options.second)
     if values[proposed] >= candidate:
         return Decision(proposed, 0.0)

@@ -1,6 +1,6 @@
 """Double DQN (van Hasselt, Guez and Silver 2016) in compiled code: an update in some 20 us.
 
-The people that Section 4.3 simulates, and its expert, learn so.
+The learners that Section 4.3 simulates, and its expert, learn so.
 """
 
 from typing import Annotated, Literal, NamedTuple
@@ -9,8 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.compilation import compiled, compiled_apart
-from qbumpers.learners.q_learning import Schedule
-from qbumpers.networks.network import Layout, Network, backward, forward, initialise
+from qbumpers.learners.epsilon_greedy import epsilon_greedy, epsilon_greedy_policy, greedy
+from qbumpers.learners.interface import Rates, Shape, Transition
+from qbumpers.learners.registry import register_learner
+from qbumpers.learners.schedules import Schedule, scheduled
+from qbumpers.networks.network import Layout, Network, backward, forward, initialise, values_of
 from qbumpers.networks.simd import multiply_add, sum_of_squares
 from qbumpers.random_streams import draw
 
@@ -32,8 +35,6 @@ class DoubleDQN(NamedTuple):
         clip: what the norm of the gradient is clipped for: "global" (all parameters together),
             "variable" (each layer's weights and biases by themselves) or "none".
         gradient_limit: of that norm.
-        penalty: what an override feels like, in reward units, to a learner whose perception
-            includes disruption.
     """
 
     network: Network = Network()
@@ -44,187 +45,206 @@ class DoubleDQN(NamedTuple):
     replay_size: Count = 50_000
     learning_starts: Count = 1_000
     target_every: Count = 1_500
-    clip: Literal["global", "variable", "none"] = "global"
+    clip: Literal["none", "global", "variable"] = "global"
     gradient_limit: Annotated[float, Field(gt=0)] = 10.0
-    penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
 
 
-CLIPS = ("none", "global", "variable")
+_GLOBAL, _VARIABLE = 1, 2  # places among the choices of `clip`
 
 
-class Rates(NamedTuple):
-    """The numbers of a `DoubleDQN` that its updates need."""
-
-    discount: float
-    learning_rate: float
-    batch_size: int
-    learning_starts: int
-    target_every: int
-    clip: int
-    gradient_limit: float
-
-
-def rates(learner: DoubleDQN) -> Rates:
-    """The numbers of a learner that its updates need."""
-    return Rates(
-        learner.discount,
-        learner.learning_rate,
-        learner.batch_size,
-        learner.learning_starts,
-        learner.target_every,
-        CLIPS.index(learner.clip),
-        learner.gradient_limit,
-    )
-
-
-class Brain(NamedTuple):
-    """What a learner carries along, all changed in place; float is float32 but in tests.
+class DQNMemory(NamedTuple):
+    """What a learner carries along, all arrays changed in place; float is float32 but in tests.
 
     Attributes:
+        layout: of its network.
         parameters: float [P], of its network.
         target: float [P], of the target network.
         gradient: float [P].
         moments: float [2, P], of Adam.
         replay: float32 [M, 2 D + 3], transitions: observation, next observation, action, reward,
-            and 0 where the next state is terminal, else 1.
+            and 0 if the next state is terminal, else 1.
         counts: int64 [2], transitions seen and updates made.
-        room: float, for batches.
+        batch_workspace: float, for the networks of an update.
+        workspace: float, for the network of one observation.
     """
 
+    layout: Layout
     parameters: np.ndarray
     target: np.ndarray
     gradient: np.ndarray
     moments: np.ndarray
     replay: np.ndarray
     counts: np.ndarray
-    room: np.ndarray
+    batch_workspace: np.ndarray
+    workspace: np.ndarray
 
 
-def make_brain(
-    learner: DoubleDQN, layout: Layout, stream: np.ndarray, precision: type = np.float32
-) -> Brain:
-    """A learner's networks, freshly initialised, and its empty replay.
+def make_memory(
+    settings: DoubleDQN, layout: Layout, stream: np.ndarray, precision: type = np.float32
+) -> DQNMemory:
+    """Networks, freshly initialised, and an empty replay.
 
     Args:
-        learner: its settings.
+        settings: of the learner.
         layout: of its network.
         stream: uint64 [4], random stream of the initial weights.
         precision: of the networks.
 
     Returns:
-        The brain.
+        The memory.
     """
     size = layout.parameters()
     parameters = np.zeros(size, precision)
     initialise(layout, parameters, stream)
-    return Brain(
+    return DQNMemory(
+        layout=layout,
         parameters=parameters,
         target=parameters.copy(),
         gradient=np.zeros(size, precision),
         moments=np.zeros((2, size), precision),
-        replay=np.zeros((learner.replay_size, 2 * layout.sizes[0] + 3), np.float32),
+        replay=np.zeros((settings.replay_size, 2 * layout.sizes[0] + 3), np.float32),
         counts=np.zeros(2, np.int64),
-        room=np.zeros(4 * layout.room(learner.batch_size), precision),
+        batch_workspace=np.zeros(4 * layout.room(settings.batch_size), precision),
+        workspace=np.zeros(layout.room(1), precision),
     )
 
 
-@compiled_apart
-def remember(
-    brain: Brain, observation: np.ndarray, action: int, reward: float, following: np.ndarray,
-    terminated: bool,
-) -> None:  # fmt: skip
-    """Keep a transition, in place of the oldest where the replay is full.
+def start(settings: DoubleDQN, shape: Shape, stream: np.ndarray) -> DQNMemory:
+    """The memory before the first episode."""
+    layout = settings.network.layout(shape.observation_size, len(shape.width))
+    return make_memory(settings, layout, stream)
 
-    Args:
-        brain: of the learner.
-        observation: float32 [D].
-        action: that the learner credits.
-        reward: as it perceives it.
-        following: float32 [D], the next observation.
-        terminated: whether the episode ended there for good; a truncation is no end.
-    """
+
+def begin(settings: DoubleDQN, memory: DQNMemory, episode: int, episodes: int) -> Rates:
+    """Exploration of an episode; the step size stays."""
+    return Rates(scheduled(settings.epsilon, episode, episodes), settings.learning_rate)
+
+
+@compiled_apart
+def choose(
+    settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, rates: Rates, stream: np.ndarray
+) -> int:
+    """An epsilon-greedy action."""
+    values = _values(memory, state)
+    return epsilon_greedy(values, rates.epsilon, draw(stream), draw(stream))
+
+
+@compiled_apart
+def policy(
+    settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, rates: Rates, out: np.ndarray
+) -> None:
+    """The probabilities of `choose`."""
+    epsilon_greedy_policy(_values(memory, state), rates.epsilon, out)
+
+
+@compiled_apart
+def prefer(settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, tie: float) -> int:
+    """A greedy action."""
+    return greedy(_values(memory, state), tie)
+
+
+@compiled
+def _values(memory: DQNMemory, observation: np.ndarray) -> np.ndarray:
+    return values_of(memory.layout, memory.parameters, memory.workspace, observation)
+
+
+@compiled_apart
+def learn(
+    settings: DoubleDQN, memory: DQNMemory, transition: Transition, rates: Rates,
+    stream: np.ndarray,
+) -> None:  # fmt: skip
+    """Remember a transition; update once from a batch, if there is enough to draw one from."""
+    remember(memory, transition)
+    replay(settings, memory, stream)
+
+
+@compiled_apart
+def remember(memory: DQNMemory, transition: Transition) -> None:
+    """Keep a transition, in place of the oldest if the replay is full."""
+    observation, next_observation = transition.state, transition.next_state
     width = len(observation)
-    line = brain.replay[brain.counts[0] % len(brain.replay)]
+    line = memory.replay[memory.counts[0] % len(memory.replay)]
     for i in range(width):
         line[i] = observation[i]
-        line[width + i] = following[i]
-    line[2 * width] = action
-    line[2 * width + 1] = reward
-    line[2 * width + 2] = 0.0 if terminated else 1.0
-    brain.counts[0] += 1
+        line[width + i] = next_observation[i]
+    line[2 * width] = transition.action
+    line[2 * width + 1] = transition.reward
+    line[2 * width + 2] = 0.0 if transition.terminated else 1.0
+    memory.counts[0] += 1
 
 
 @compiled_apart
-def learn(layout: Layout, brain: Brain, rates: Rates, stream: np.ndarray) -> None:
+def replay(settings: DoubleDQN, memory: DQNMemory, stream: np.ndarray) -> None:
     """One update from a batch drawn at random, once there is enough to draw from.
 
     Args:
-        layout: of the network.
-        brain: of the learner.
-        rates: of the learner.
+        settings: of the learner, as numbers.
+        memory: changed in place.
         stream: uint64 [4], random stream of the batch.
     """
-    seen = brain.counts[0]
-    if seen < rates.learning_starts:
+    seen = memory.counts[0]
+    if seen < settings.learning_starts:
         return
-    among = min(seen, len(brain.replay))
-    batch = np.empty(rates.batch_size, np.int64)
-    for n in range(rates.batch_size):
+    among = min(seen, len(memory.replay))
+    batch = np.empty(settings.batch_size, np.int64)
+    for n in range(settings.batch_size):
         batch[n] = int(draw(stream) * among)
-    update(layout, brain, rates, batch)
-    if seen % rates.target_every == 0:
-        brain.target[:] = brain.parameters
+    update(settings, memory, batch)
+    if seen % settings.target_every == 0:
+        memory.target[:] = memory.parameters
 
 
 @compiled_apart
-def update(layout: Layout, brain: Brain, rates: Rates, batch: np.ndarray) -> None:
+def update(settings: DoubleDQN, memory: DQNMemory, batch: np.ndarray) -> None:
     """One step of Adam on the Huber loss of given transitions.
 
     Args:
-        layout: of the network.
-        brain: of the learner.
-        rates: of the learner.
+        settings: of the learner, as numbers.
+        memory: changed in place.
         batch: int64 [N], places in the replay.
     """
-    loss_gradient(layout, brain, rates.discount, batch)
-    if rates.clip == 1:
-        _shorten(brain.gradient, rates.gradient_limit)
-    elif rates.clip == 2:
-        _shorten_each(layout, brain.gradient, rates.gradient_limit)
-    brain.counts[1] += 1
-    _adam(brain.parameters, brain.gradient, brain.moments, rates.learning_rate, brain.counts[1])
+    loss_gradient(memory, settings.discount, batch)
+    if settings.clip == _GLOBAL:
+        _shorten(memory.gradient, settings.gradient_limit)
+    elif settings.clip == _VARIABLE:
+        _shorten_each(memory.layout, memory.gradient, settings.gradient_limit)
+    memory.counts[1] += 1
+    _adam(
+        memory.parameters, memory.gradient, memory.moments, settings.learning_rate,
+        memory.counts[1],
+    )  # fmt: skip
 
 
 @compiled_apart
-def loss_gradient(layout: Layout, brain: Brain, discount: float, batch: np.ndarray) -> None:
+def loss_gradient(memory: DQNMemory, discount: float, batch: np.ndarray) -> None:
     """Gradient of the mean Huber loss, of width 1, between action values and their targets.
 
-    The target of a transition is its reward and, where it does not end the episode, the discounted
-    value that the target network gives the action which the network itself prefers.
+    The target of a transition is its reward and, unless it ends the episode, the discounted value
+    that the target network gives the action which the network itself prefers.
 
     Args:
-        layout: of the network.
-        brain: of the learner; its `gradient` is overwritten.
+        memory: its `gradient` is overwritten.
         discount: of the values.
         batch: int64 [N], places in the replay.
     """
+    layout = memory.layout
     states, width, actions = len(batch), layout.sizes[0], layout.actions
-    size = len(brain.room) // 4
-    now, preferred = brain.room[:size], brain.room[size : 2 * size]
-    later, spare = brain.room[2 * size : 3 * size], brain.room[3 * size :]
+    size = len(memory.batch_workspace) // 4
+    now, preferred = memory.batch_workspace[:size], memory.batch_workspace[size : 2 * size]
+    later, spare = memory.batch_workspace[2 * size : 3 * size], memory.batch_workspace[3 * size :]
     for n in range(states):
-        line = brain.replay[batch[n]]
+        line = memory.replay[batch[n]]
         for i in range(width):
             now[n * width + i] = line[i]
             preferred[n * width + i] = line[width + i]
             later[n * width + i] = line[width + i]
-    preferences = forward(layout, brain.parameters, preferred, states)
-    futures = forward(layout, brain.target, later, states)
-    values = forward(layout, brain.parameters, now, states)
+    preferences = forward(layout, memory.parameters, preferred, states)
+    futures = forward(layout, memory.target, later, states)
+    values = forward(layout, memory.parameters, now, states)
     deltas = preferences  # of equal shape, and no longer needed once a row is read
     kind = values.dtype.type
     for n in range(states):
-        line = brain.replay[batch[n]]
+        line = memory.replay[batch[n]]
         best = 0
         for action in range(1, actions):
             if preferences[n, action] > preferences[n, best]:
@@ -235,12 +255,12 @@ def loss_gradient(layout: Layout, brain: Brain, discount: float, batch: np.ndarr
         for action in range(actions):
             deltas[n, action] = kind(0)
         deltas[n, credited] = min(max(difference, kind(-1)), kind(1)) / kind(states)
-    backward(layout, brain.parameters, now, deltas, spare, brain.gradient)
+    backward(layout, memory.parameters, now, deltas, spare, memory.gradient)
 
 
 @compiled_apart
 def _shorten(gradient: np.ndarray, limit: float) -> None:
-    """Scale a gradient down to a norm of `limit` where it is longer."""
+    """Scale a gradient down to a norm of `limit` if it is longer."""
     norm = np.sqrt(sum_of_squares(gradient))
     if norm > limit:
         gradient *= gradient.dtype.type(limit) / norm
@@ -299,3 +319,9 @@ def _adam(
         first[i] = mean
         second[i] = square
         parameters[i] -= step * mean / multiply_add(np.sqrt(square), correction, epsilon)
+
+
+register_learner(
+    "double-dqn", DoubleDQN, start=start, begin=begin, choose=choose, prefer=prefer, policy=policy,
+    learn=learn, observes="vectors",
+)  # fmt: skip

@@ -5,95 +5,99 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.choice import best_value, pick
+from qbumpers.borrowing import row
+from qbumpers.choice import best_value
 from qbumpers.compilation import compiled
-
-
-class Schedule(NamedTuple):
-    """A number that changes linearly over the first episodes and then stays.
-
-    Attributes:
-        start: value in the first episode.
-        end: value once the decay is over.
-        fraction: share of all episodes over which it decays.
-    """
-
-    start: Annotated[float, Field(ge=0, le=1)] = 1.0
-    end: Annotated[float, Field(ge=0, le=1)] = 0.02
-    fraction: Annotated[float, Field(ge=0, le=1)] = 0.9
+from qbumpers.learners.epsilon_greedy import epsilon_greedy, epsilon_greedy_policy, greedy
+from qbumpers.learners.interface import Rates, Shape, Table, Transition
+from qbumpers.learners.registry import register_learner
+from qbumpers.learners.schedules import Schedule, scheduled
+from qbumpers.random_streams import draw
 
 
 class QLearner(NamedTuple):
-    """A tabular Q-learner; its table of values lives with the trial.
+    """A tabular Q-learner (Watkins 1989).
 
     Attributes:
         discount: of the learner's own values.
         epsilon: probability of a random action, by episode.
         learning_rate: step size, by episode.
         initial_value: of every action in every state, in reward units.
-        penalty: what an override feels like, in reward units, to a learner whose perception
-            includes disruption.
     """
 
     discount: Annotated[float, Field(gt=0, le=1)] = 1.0
     epsilon: Schedule = Schedule()
     learning_rate: Schedule = Schedule()
     initial_value: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
 
 
 @compiled
-def scheduled(schedule: Schedule, episode: int, episodes: int) -> float:
-    """Value in one episode: start + min(e / n, 1) (end - start), n = int(fraction * episodes).
-
-    Args:
-        schedule: the schedule.
-        episode: e, counted from 0.
-        episodes: of the whole trial.
-
-    Returns:
-        The value; `end` at once where n is 0.
-    """
-    decay = int(schedule.fraction * episodes)
-    progress = min(episode / decay, 1.0) if decay > 0 else 1.0
-    return schedule.start + progress * (schedule.end - schedule.start)
+def start(settings: QLearner, shape: Shape, stream: np.ndarray) -> Table:
+    """A table in which every action has the initial value."""
+    values = np.full((shape.states, len(shape.width)), settings.initial_value)
+    return Table(values, shape.width)
 
 
 @compiled
-def choose_greedily(row: np.ndarray, tie: float) -> int:
-    """An action of the largest value in `row` [A], ties broken by `tie` in [0, 1)."""
-    return pick(row, best_value(row), tie)
+def begin(settings: QLearner, memory: Table, episode: int, episodes: int) -> Rates:
+    """Exploration and step size of an episode."""
+    return Rates(
+        scheduled(settings.epsilon, episode, episodes),
+        scheduled(settings.learning_rate, episode, episodes),
+    )
 
 
 @compiled
-def choose(row: np.ndarray, epsilon: float, coin: float, tie: float) -> int:
-    """Epsilon-greedy choice.
-
-    Args:
-        row: float64 [A], the learner's values in this state.
-        epsilon: probability of a random action.
-        coin: in [0, 1), explore or not.
-        tie: in [0, 1), which random action, or which of equally good ones.
-
-    Returns:
-        The action.
-    """
-    if coin < epsilon:
-        return int(tie * len(row))
-    return choose_greedily(row, tie)
+def choose(settings: QLearner, memory: Table, state: int, rates: Rates, stream: np.ndarray) -> int:
+    """An epsilon-greedy action."""
+    values = row(memory.values, state, memory.width)
+    return epsilon_greedy(values, rates.epsilon, draw(stream), draw(stream))
 
 
 @compiled
-def learned(old: float, reward: float, next_value: float, learning_rate: float) -> float:
-    """The Q-learning update: old + rate * (reward + next_value - old).
+def policy(settings: QLearner, memory: Table, state: int, rates: Rates, out: np.ndarray) -> None:
+    """The probabilities of `choose`."""
+    epsilon_greedy_policy(row(memory.values, state, memory.width), rates.epsilon, out)
+
+
+@compiled
+def prefer(settings: QLearner, memory: Table, state: int, tie: float) -> int:
+    """A greedy action."""
+    return greedy(row(memory.values, state, memory.width), tie)
+
+
+@compiled
+def q_update(old: float, reward: float, next_value: float, learning_rate: float) -> float:
+    """The new value of an action: old + rate * (reward + next_value - old).
 
     Args:
         old: value of the credited action.
         reward: as perceived.
-        next_value: discounted value of the next state; 0 where it is terminal.
+        next_value: discounted value of the next state; 0 if it is terminal.
         learning_rate: step size in [0, 1].
 
     Returns:
-        The new value of the credited action.
+        The new value, in reward units.
     """
     return old + learning_rate * (reward + next_value - old)
+
+
+@compiled
+def learn(
+    settings: QLearner, memory: Table, transition: Transition, rates: Rates, stream: np.ndarray
+) -> None:
+    """Move the credited action towards its reward and the best value of where it led."""
+    future = 0.0
+    if not transition.terminated:
+        following = row(memory.values, transition.next_state, memory.width)
+        future = settings.discount * best_value(following)
+    values = row(memory.values, transition.state, memory.width)
+    values[transition.action] = q_update(
+        values[transition.action], transition.reward, future, rates.learning_rate
+    )
+
+
+register_learner(
+    "q-learning", QLearner, start=start, begin=begin, choose=choose, prefer=prefer, policy=policy,
+    learn=learn,
+)  # fmt: skip

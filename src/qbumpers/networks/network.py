@@ -167,20 +167,23 @@ def forward(layout: Layout, parameters: np.ndarray, room: np.ndarray, states: in
 
 
 @compiled_apart
-def values_of(network: tuple[Any, ...], observation: np.ndarray) -> np.ndarray:
+def values_of(
+    layout: Layout, parameters: np.ndarray, workspace: np.ndarray, observation: np.ndarray
+) -> np.ndarray:
     """Action values of one observation.
 
     Args:
-        network: its layout as a plain tuple, its parameters, and room for one state.
-        observation: float [D].
+        layout: of the network.
+        parameters: float [P].
+        workspace: float [`layout.room(1)` or more], overwritten.
+        observation: float32 [D].
 
     Returns:
-        float [A], a view of the room.
+        float [A], a view of the workspace.
     """
-    layout, parameters, room = network
     for i in range(len(observation)):
-        room[i] = observation[i]
-    return forward(Layout(*layout), parameters, room, 1)[0]
+        workspace[i] = observation[i]
+    return forward(layout, parameters, workspace, 1)[0]
 
 
 @compiled

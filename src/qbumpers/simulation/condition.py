@@ -1,44 +1,114 @@
 """What a trial needs, checked before any of it runs."""
 
 import hashlib
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
-from qbumpers.assistants import Assistant, make_assistant
-from qbumpers.errors import RequestError, checked
-from qbumpers.learners import DoubleDQN, QLearner
+from qbumpers.assistants import Assistant, assistant_of
+from qbumpers.decisions import Model
+from qbumpers.errors import RequestError, checked, unknown_name
+from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
+from qbumpers.registration import as_numbers
 from qbumpers.simulation.outcomes import Outcomes
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
+
+_FIRST_LEARNERS = ("q-learning", "double-dqn")  # what these seed does not name them
+
+
+class Setup(TypedDict, total=False):
+    """What `simulate` and `make_condition` take by name, beside task and assistant.
+
+    Attributes:
+        values: Q* of the assistant; the exact solution of a task with a table if left out. Values
+            that state no discount are taken to have the task's.
+        learner: settings of a registered learner, for instance `QLearner()`; the paper's, with the
+            task's discount, if left out.
+        perception: what the learner believes happened when it was overridden, a `Perception` or the
+            name of one of `qbumpers.learners.PERCEPTIONS`; "transition" if left out.
+        penalty: what an override feels like to one of the named perceptions that include
+            disruption, in reward units; 1 if left out.
+        motor: how the learner's hand errs; never if left out.
+        forgetting: share of the way back to what it knew at first that the learner of a table goes
+            between two episodes, in [0, 1]; 0 if left out.
+        episodes: of a trial, at least 1; 100 if left out.
+        retention: further episodes in which the learner goes on without the assistant, each
+            followed by a greedy one; 0 if left out.
+        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+    """
+
+    values: QValues | None
+    learner: Any
+    perception: str | Perception
+    penalty: float
+    motor: Motor
+    forgetting: float
+    episodes: int
+    retention: int
+    common_random_numbers: bool
 
 
 class Condition(NamedTuple):
     """What a trial needs: everything but the seed and the number of the trial.
 
     Attributes:
-        task: the task.
-        values: Q* of the assistant; float64 [S, A] of a tabular task, else a network.
+        task: what is to be learned.
+        values: Q* of the assistant; float64 [S, A] of a task with a table, else a network.
+        others: the further rows of values that the assistant's rule named, float64 [S, K, A], or
+            networks.
         discount: of those values.
-        assistant: the assistant.
-        learner: the simulated person.
-        perception: name of what they believe happened.
-        episodes: E, assisted episodes of a trial, each followed by a greedy one without help.
+        assistant: that helps.
+        learner: settings of the simulated learner.
+        perception: what it believes happened, or the name of that.
+        penalty: of a named perception that includes disruption, in reward units.
+        motor: how its hand errs.
+        forgetting: share forgotten between two episodes.
+        episodes: E, assisted episodes of a trial, each followed by a greedy unassisted one.
         retention: R, further episodes in which the learner goes on without the assistant.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
     """
 
     task: Task
     values: Any
+    others: Any
     discount: float
     assistant: Assistant
-    learner: QLearner | DoubleDQN
-    perception: str
-    episodes: int
+    learner: Any
+    perception: str | Perception = "transition"
+    penalty: float = 1.0
+    motor: Motor = Motor()
+    forgetting: float = 0.0
+    episodes: int = 100
     retention: int = 0
     common_random_numbers: bool = False
+
+    @property
+    def learner_type(self) -> LearnerType:
+        """The registered kind of its learner."""
+        return learner_for_settings(type(self.learner))
+
+    def perceived(self) -> Perception:
+        """What the learner believes happened."""
+        if isinstance(self.perception, Perception):
+            return self.perception
+        found = named_perception(self.perception)
+        return found._replace(penalty=self.penalty) if found.penalty else found
+
+    def model(self) -> Model:
+        """What a rule with memory is told of the task."""
+        task = self.task
+        return Model(
+            task.states,
+            task.observation_size,
+            task.actions,
+            task.no_op,
+            self.discount,
+            task.dynamics() if task.states else None,
+            task.distance,
+        )
 
     def content(self) -> dict[str, Any]:
         """All that decides a trial's outcomes, as JSON-like data: it names stored results."""
@@ -49,23 +119,50 @@ class Condition(NamedTuple):
         }
 
     def learning(self) -> dict[str, Any]:
-        """What decides the assisted episodes, as JSON-like data: it seeds the random streams."""
+        """What decides the assisted episodes, as JSON-like data: it seeds the random streams.
+
+        Streams, and with them published numbers, hang on every byte of it: what came later is in it
+        only if it is used.
+        """
+        named = isinstance(self.perception, str)
+        added = {
+            "learner name": ""
+            if self.learner_type.name in _FIRST_LEARNERS
+            else self.learner_type.name,
+            "motor": _plain(self.motor) if self.motor != Motor() else None,
+            "forgetting": self.forgetting,
+            "others": _digest(self.others) if self.assistant.values else "",
+            "files": _file_digests(self.assistant),
+        }
         return {
             "task": self.task.digest(),
             "values": _digest(self.values),
             "discount": self.discount,
             "assistant": self.assistant.name,
-            "options": self.assistant.options._asdict(),
-            "learner": _plain(self.learner),
-            "perception": self.perception,
+            "options": self.assistant.described(),
+            "learner": {**_plain(self.learner), "penalty": self.penalty},
+            "perception": self.perception if named else _plain(self.perception),
             "episodes": self.episodes,
+            **{name: part for name, part in added.items() if part},
         }
 
 
-def _digest(values: Any) -> str:
+def _digest(values: Any) -> Any:
+    if isinstance(values, tuple):
+        return [each.digest() for each in values]
     if isinstance(values, NetworkValues):
         return values.digest()
     return hashlib.sha256(values.tobytes()).hexdigest()
+
+
+def _file_digests(assistant: Assistant) -> list[str]:
+    """What the files among an assistant's options hold."""
+    own = [
+        hashlib.sha256(value.tobytes()).hexdigest()
+        for value in assistant.numbers
+        if isinstance(value, np.ndarray)
+    ]
+    return own + (_file_digests(assistant.of) if assistant.of else [])
 
 
 def _plain(settings: Any) -> Any:
@@ -75,94 +172,158 @@ def _plain(settings: Any) -> Any:
     return settings
 
 
-def make_condition(
-    task: Task,
-    assistant: Assistant | str,
-    *,
-    values: QValues | None = None,
-    learner: QLearner | DoubleDQN | None = None,
-    perception: str = "transition",
-    episodes: int = 100,
-    retention: int = 0,
-    common_random_numbers: bool = False,
-) -> Condition:
+def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup]) -> Condition:
     """Check everything that a simulation needs, before any of it runs.
 
     Args:
-        task: the task.
+        task: what is to be learned.
         assistant: an assistant, or the name of one that needs no options.
-        values: Q* of the assistant; where None, the exact solution of a tabular task. Values that
-            state no discount are taken to have the task's.
-        learner: the simulated person; where None, the paper's, with the task's discount: a
-            `QLearner` at a tabular task, else a `DoubleDQN`.
-        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
-        episodes: of a trial, at least 1.
-        retention: further episodes without the assistant, not negative.
-        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+        **setup: see `Setup`.
 
     Returns:
         The condition.
 
     Raises:
-        RequestError: where a name is unknown, a number is out of range, the values do not fit the
-            task, or an episode could start where the assistant's options do not suit it.
+        RequestError: if a name is unknown, a number is out of range, the values do not fit the
+            task, the task lacks what the assistant needs, or an episode could start in a state that
+            does not suit the assistant's options.
     """
-    if episodes < 1:
-        raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")
-    if retention < 0:
-        raise RequestError(f"retention = {retention!r}; 0 or more is needed")
-    if isinstance(assistant, str):
-        assistant = make_assistant(assistant)
-    named_perception(perception)
-    kept, discount = _checked_values(task, assistant, values)
-    return Condition(
-        task=task,
-        values=kept,
-        discount=discount,
-        assistant=assistant,
-        learner=_checked_learner(task, learner),
-        perception=perception,
-        episodes=episodes,
-        retention=retention,
-        common_random_numbers=common_random_numbers,
+    for name in setup:
+        if name not in Setup.__annotations__:
+            raise unknown_name("setting", name, Setup.__annotations__)
+    helper = assistant_of(assistant, "assistant")
+    helper.check_task(task.name, _has(task))
+    found = _checked_values(task, helper, setup.get("values"))
+    perception = setup.get("perception", "transition")
+    if isinstance(perception, Perception):
+        perception = checked(Perception, perception._asdict(), "perception")
+    else:
+        named_perception(perception)
+    condition = Condition(
+        task,
+        *found,
+        helper,
+        _checked_learner(task, setup.get("learner")),
+        perception,
+        setup.get("penalty", 1.0),
+        checked(Motor, setup.get("motor", Motor())._asdict(), "motor"),
+        setup.get("forgetting", 0.0),
+        setup.get("episodes", 100),
+        setup.get("retention", 0),
+        setup.get("common_random_numbers", False),
+    )
+    _check_numbers(condition)
+    return condition
+
+
+def _check_numbers(condition: Condition) -> None:
+    if condition.episodes < 1:
+        raise RequestError(f"episodes = {condition.episodes!r}; at least 1 is needed")
+    if condition.retention < 0:
+        raise RequestError(f"retention = {condition.retention!r}; 0 or more is needed")
+    if not 0 <= condition.forgetting <= 1:
+        raise RequestError(f"forgetting = {condition.forgetting!r}; it must lie in [0, 1]")
+    if condition.forgetting and not condition.task.states:
+        raise RequestError(
+            f"forgetting = {condition.forgetting!r}; at task {condition.task.name} learners "
+            "observe vectors, and only tables are forgotten"
+        )
+
+
+def _has(task: Task) -> dict[str, bool]:
+    """What a task has of what a rule may need."""
+    return {
+        "states": task.states > 0,
+        "dynamics": task.states > 0,
+        "distance": task.has_distance,
+        "undo": task.undoable,
+        "no_op": task.no_op >= 0,
+    }
+
+
+def _checked_values(
+    task: Task, assistant: Assistant, values: QValues | None
+) -> tuple[Any, Any, float]:
+    """Q* as a condition keeps it, the further rows, and the discount."""
+    if not task.states:
+        return _checked_network(task, assistant, values)
+    source: Any = solve(task) if values is None else values
+    table = _table(task, source, "")
+    others = np.zeros((task.states, len(assistant.values), task.actions))
+    for place, name in enumerate(assistant.values):
+        others[:, place] = _table(task, _further(source, name, assistant), f" {name!r}")
+    for state in np.flatnonzero(task.start):
+        assistant.check_start(float(table[state].max()))
+    return table, others, float(getattr(source, "discount", task.discount))
+
+
+def _further(source: Any, name: str, assistant: Assistant) -> Any:
+    """Further values beside Q*, by name."""
+    further = getattr(source, "others", {})
+    if name not in further:
+        known = ", ".join(further) or "none"
+        raise RequestError(
+            f"assistant {assistant.name}: it needs further values {name!r}; known: {known}"
+        )
+    return further[name]
+
+
+def _table(task: Task, source: Any, name: str) -> np.ndarray:
+    """Values of every state, float64 [S, A]; those of what the assistant sees of it."""
+    seen = range(task.states) if task.seen is None else task.seen
+    return np.stack(
+        [
+            check_width(source(int(number)), task.actions, f"{name} in state {state}".strip())
+            for state, number in enumerate(seen)
+        ]
     )
 
 
-def _checked_values(task: Task, assistant: Assistant, values: QValues | None) -> tuple[Any, float]:
-    """Q* as a condition keeps it, and its discount."""
-    if isinstance(task, TabularTask):
-        source = solve(task) if values is None else values
-        table = np.stack(
-            [
-                check_width(source(state), task.actions, f"in state {state}")
-                for state in range(task.states)
-            ]
-        )
-        for state in np.flatnonzero(task.start):
-            assistant.check_start(float(table[state].max()))
-        return table, float(getattr(source, "discount", task.discount))
+def _checked_network(
+    task: Task, assistant: Assistant, values: QValues | None
+) -> tuple[Any, Any, float]:
     if not isinstance(values, NetworkValues):
         raise RequestError(
             f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
-    found = (values.inputs, values.actions)
-    if found != (task.observation_size, task.actions):
-        raise RequestError(
-            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
-            f"{task.name} needs {task.observation_size} and {task.actions}"
-        )
-    return values, values.discount
+    others = tuple(_further(values, name, assistant) for name in assistant.values)
+    for network in (values, *others):
+        found = (network.inputs, network.actions)
+        if found != (task.observation_size, task.actions):
+            raise RequestError(
+                f"values of {network.task}: a network of {found[0]} inputs and {found[1]} actions; "
+                f"task {task.name} needs {task.observation_size} and {task.actions}"
+            )
+    for network in others:
+        if network.layout != values.layout:
+            raise RequestError(
+                f"values of {values.task}: further values must come from a network of the same "
+                "shape as Q*"
+            )
+    return values, others, values.discount
 
 
-def _checked_learner(task: Task, learner: QLearner | DoubleDQN | None) -> QLearner | DoubleDQN:
-    kind = QLearner if isinstance(task, TabularTask) else DoubleDQN
-    learner = kind(discount=task.discount) if learner is None else learner
-    if not isinstance(learner, kind):
+def _checked_learner(task: Task, settings: Any) -> Any:
+    if settings is None:
+        kind = learner_type(task.learners[0]).settings_type
+        return kind(discount=task.discount)
+    learner = learner_for_settings(type(settings))
+    if (learner.observes == "states") != (task.states > 0):
+        needed = "numbered states" if task.states else "vectors"
         raise RequestError(
-            f"learner = {learner!r}; at task {task.name} people learn by a {kind.__name__}"
+            f"learner = {settings!r}; it observes {learner.observes}, and task {task.name} has "
+            f"{needed}, as have the learners {', '.join(task.learners)}"
         )
-    return checked(kind, _plain(learner), "learner")
+    return checked(type(settings), _plain(settings), "learner")
+
+
+def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | None, float | None]:
+    """Settings, perception, motor noise and forgetting as compiled loops take them."""
+    motor = None if condition.motor == Motor() else condition.motor
+    forgetting = float(condition.forgetting) if condition.forgetting else None
+    perception = as_numbers(condition.perceived())
+    return as_numbers(condition.learner), perception, motor, forgetting
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:

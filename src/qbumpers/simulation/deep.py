@@ -1,28 +1,32 @@
-"""Simulated people who see vectors and learn by Double DQN, trial after trial (Section 4.3)."""
+"""Simulated learners that observe vectors, trial after trial (Section 4.3)."""
 
-import math
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from qbumpers.assistants.dispatch import start
 from qbumpers.compilation import compiled_for_session, entered, uncompiled
+from qbumpers.decisions import Step, checked_action
 from qbumpers.errors import RequestError
-from qbumpers.learners import DoubleDQN
-from qbumpers.learners import perception as named_perception
-from qbumpers.learners.double_dqn import make_brain, rates
-from qbumpers.learners.q_learning import scheduled
+from qbumpers.learners.dispatch import begin as begin_learner
+from qbumpers.learners.dispatch import start as start_learner
+from qbumpers.learners.interface import Shape
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw
-from qbumpers.simulation.condition import Condition, outcome_room, streams
-from qbumpers.simulation.deep_steps import START_VALUE, act, prefer, take
-from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, Steps
+from qbumpers.simulation.condition import Condition, compiled_learner, outcome_room, streams
+from qbumpers.simulation.deep_steps import (
+    NOT_FINITE,
+    START_VALUE,
+    NetworkAssistance,
+    act,
+    preferred,
+    take,
+)
+from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
 from qbumpers.tasks import VectorTask
-from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED, finite
+from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
 _ENDED = TERMINATED | TRUNCATED
 
-_act_for_session = compiled_for_session(uncompiled(act))
-_take_for_session = compiled_for_session(uncompiled(take))
+_SESSION = {f: compiled_for_session(uncompiled(f)) for f in (act, take, preferred)}
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
@@ -32,16 +36,18 @@ def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     return Simulation(outcomes, None)
 
 
-def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Steps:
-    """Every assisted step of one trial; `qbumpers.simulation.record` says more."""
-    rows: list[tuple[Any, ...]] = []
+def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Step:
+    """Every step of training of one trial; `qbumpers.simulation.record` says more."""
+    rows: list[Step] = []
     _run_trials(condition, trials, seed, outcome_room(condition, 1), rows, script)
-    kinds = (
-        np.int64, np.float32, np.float32, np.uint8, np.int64, np.int64, np.int64, np.bool_,
-        np.float64, np.float64, np.float64, np.float64, np.float64, np.float64,
+    kinds = Step(
+        episode=np.int64, state=np.float32, proposed=np.int64, executed=np.int64, undone=np.bool_,
+        credited=np.int64, overridden=np.bool_, probability=np.float64, coin=np.float64,
+        tie=np.float64, values=cast(Any, np.float64), projected_return=np.float64,
+        reward=np.float64, next_state=np.float32, events=np.uint8,
     )  # fmt: skip
     columns = zip(*rows, strict=True) if rows else [()] * len(kinds)
-    return Steps(*(np.array(c, kind) for c, kind in zip(columns, kinds, strict=True)))
+    return Step(*(np.array(c, kind) for c, kind in zip(columns, kinds, strict=True)))
 
 
 def _run_trials(
@@ -49,14 +55,14 @@ def _run_trials(
     trials: range,
     seed: int,
     outcomes: Outcomes,
-    rows: list[tuple[Any, ...]] | None,
+    rows: list[Step] | None,
     script: Script | None,
 ) -> None:
     each = streams(condition, trials, seed)
     for place, number in enumerate(trials):
         trial = _Trial(condition, number, each[place], rows, script)
         for episode in range(condition.episodes + condition.retention):
-            trial.live(episode, outcomes, place)
+            trial.run_episodes(episode, outcomes, place)
 
 
 class _Calls(NamedTuple):
@@ -64,12 +70,11 @@ class _Calls(NamedTuple):
 
     act: Any
     take: Any
-    prefer: Any
-    finite: Any
+    preferred: Any
 
 
 class _Trial:
-    """One person's trial.
+    """One learner's trial.
 
     Args:
         condition: what is simulated.
@@ -84,55 +89,58 @@ class _Trial:
         condition: Condition,
         number: int,
         each: np.ndarray,
-        rows: list[tuple[Any, ...]] | None,
+        rows: list[Step] | None,
         script: Script | None,
     ) -> None:
-        task, person = cast(VectorTask, condition.task), cast(DoubleDQN, condition.learner)
-        self._condition, self._task, self._person = condition, task, person
+        task = cast(VectorTask, condition.task)
+        self._condition, self._task = condition, task
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
         self._rows, self._script, self._played = rows, script, 0
-        layout = person.network.layout(task.observation_size, task.actions)
-        brain = make_brain(person, layout, self._streams[LEARNER])
-        self._brain = tuple(brain)
-        self._learner = (tuple(layout), brain.parameters, np.zeros(layout.room(1), np.float32))
-        values = condition.values
-        room = np.zeros(values.layout.room(1), np.float32)
-        self._expert = (tuple(values.layout), values.parameters, room)
-        self._known, self._account = np.zeros(task.actions), np.zeros(3)
-        self._numbers, self._penalty = tuple(rates(person)), float(person.penalty)
-        self._perception = tuple(named_perception(condition.perception))
-        self._options = condition.assistant.options
-        self._memory = start(self._options)
+        shape = Shape(0, task.observation_size, (0,) * task.actions)
+        self._memory = start_learner(condition.learner, shape, self._streams[LEARNER])
+        self._settings, self._perception, self._motor, _ = compiled_learner(condition)
+        self._numbers = np.zeros(5)
+        self._assistance = {True: _assistance(condition)}
+        self._assistance[False] = self._assistance[True]._replace(options=None)
+        self._rule_memory = condition.assistant.start(condition.model())
+        self._undoes = "undo" in condition.assistant.needs
+        self._rates = begin_learner(condition.learner, self._memory, 0, condition.episodes)
         self._calls = {True: self._entered(True)}
         if condition.retention:
             self._calls[False] = self._entered(False)
 
-    def _entered(self, helped: bool) -> _Calls:
-        """The calls of a step, compiled unless the assistant's rule cannot be."""
-        rule = self._condition.assistant.rule
-        calls = (act, take) if rule.built_in else (_act_for_session, _take_for_session)
-        if not rule.compiled:
+    def _entered(self, assisted: bool) -> _Calls:
+        """The calls of a step, compiled unless the rule or the learner cannot be."""
+        assistant, learner = self._condition.assistant, self._condition.learner_type
+        calls = (act, take, preferred)
+        if not (assistant.built_in and learner.built_in):
+            calls = tuple(_SESSION[each] for each in calls)
+        if not (assistant.compiled and learner.compiled):
             calls = tuple(map(uncompiled, calls))
         observation = np.zeros(self._task.observation_size, np.float32)
+        learning = (self._settings, self._memory, self._rates)
+        helped = (self._assistance[assisted], self._rule_memory)
+        script = None if self._script is None else (0, 0.0, 0.0)
+        stream = self._streams[EVALUATION]
         return _Calls(
             entered(
-                calls[0], self._learner, self._expert, observation, self._known, self._streams,
-                0.0, True, self._options, self._memory, self._account,
-                None if self._script is None else (0, 0.0, 0.0),
+                calls[0], *learning, self._motor, *helped, observation, self._numbers, 0,
+                self._streams, script,
             ),
             entered(
-                calls[1], self._learner, self._brain, self._numbers, self._penalty,
-                self._perception, observation, observation, (0, 0, 0.0, 0.0, 0.0), 0.0, 0,
-                self._streams, self._known, self._options if helped else None, self._memory,
-                self._account, self._condition.discount,
+                calls[1], *learning, self._perception, *helped, observation,
+                (0, 0, False, 0.0, 0.0, 0.0), (observation, 0.0, 0, 0), self._numbers,
+                self._streams,
             ),
-            entered(prefer, self._learner, observation, self._streams[EVALUATION]),
-            entered(finite, 0.0, observation),
+            entered(
+                calls[2], self._settings, self._memory, self._motor, observation, 0.0, 0, 0, True,
+                stream,
+            ),
         )  # fmt: skip
 
-    def live(self, episode: int, outcomes: Outcomes, place: int) -> None:
-        """An episode of training, then a greedy one without help.
+    def run_episodes(self, episode: int, outcomes: Outcomes, place: int) -> None:
+        """An episode of training, then a greedy unassisted one.
 
         Args:
             episode: its number.
@@ -152,76 +160,98 @@ class _Trial:
     def _assisted_episode(self, episode: int) -> tuple[float, int, int, int]:
         """Return, length, events and overrides of an episode of training."""
         condition, limit = self._condition, self._task.episode_limit
-        helped = episode < condition.episodes
-        epsilon = scheduled(self._person.epsilon, episode, condition.episodes)
-        self._account[:] = 0.0, 1.0, math.nan
+        self._rates = begin_learner(condition.learner, self._memory, episode, condition.episodes)
+        self._numbers[:] = 0.0, 1.0, 0.0, episode, 0
         observation = self._begin(self._streams[ENVIRONMENT], episode)
-        total, overrides, events, length = 0.0, 0, 0, 0
+        total, overrides, events, length, last = 0.0, 0, 0, 0, -1
         while length < limit and not events & _ENDED:
             script = None
             if self._script is not None:
                 if self._played == len(self._script.proposed):
                     break
                 script = self._scripted()
-            observation, reward, event, overridden = self._step(
-                observation, epsilon, helped, script, (episode, length)
-            )
-            total += reward
-            overrides += overridden
-            events |= event
             length += 1
+            step, observation = self._step(observation, last, script, length == limit)
+            total += step.reward
+            overrides += step.overridden
+            events |= step.events
+            last = step.proposed
         return total, length, events, overrides
 
     def _step(
-        self,
-        observation: np.ndarray,
-        epsilon: float,
-        helped: bool,
-        script: Any,
-        when: tuple[int, int],
-    ) -> tuple[np.ndarray, float, int, bool]:
-        """Where a step of training leads, its reward and events, and whether it was overridden."""
-        calls, streams, known, account = (
-            self._calls[helped], self._streams, self._known, self._account,
-        )  # fmt: skip
+        self, observation: np.ndarray, last: int, script: Any, final: bool
+    ) -> tuple[Step, np.ndarray]:
+        """The record of a step of training, and the observation after it."""
+        episode = int(self._numbers[3])
+        assisted = episode < self._condition.episodes
+        calls, assistance = self._calls[assisted], self._assistance[assisted]
+        learning = (self._settings, self._memory, self._rates)
+        first = self._numbers[4] == 0
         chosen = calls.act(
-            self._learner, self._expert, observation, known, streams, epsilon, helped,
-            self._options, self._memory, account, script,
+            *learning, self._motor, assistance, self._rule_memory, observation, self._numbers,
+            last, self._streams, script,
         )  # fmt: skip
-        if when[1] == 0:
-            self._condition.assistant.check_start(float(account[START_VALUE]))
-        proposed, executed = chosen[:2]
-        if not 0 <= executed < self._task.actions:
-            raise RequestError("the assistant's rule chose an action outside the action space")
-        following, reward, event = self._stepper.step(executed)
-        credited, projected, self._memory, sound = calls.take(
-            self._learner, self._brain, self._numbers, self._penalty, self._perception,
-            observation, following, chosen, reward, event, streams, known,
-            self._options if helped else None, self._memory, account, self._condition.discount,
+        if first:
+            self._condition.assistant.check_start(float(self._numbers[START_VALUE]))
+        proposed, executed, undone, probability, coin, tie = chosen
+        checked_action(executed, self._task.actions)
+        next_observation, reward, events, after = self._environment_step(
+            observation, executed, undone
+        )
+        happened = events & ~_ENDED if undone else events
+        happened |= LIMIT if final and not happened & _ENDED else 0
+        credited, projected, self._rule_memory, sound = calls.take(
+            *learning, self._perception, assistance, self._rule_memory, observation, chosen,
+            (next_observation, reward, events, happened), self._numbers, self._streams,
         )  # fmt: skip
         if not sound:
-            raise self._not_finite(when[0], when[1], following, reward)
+            raise self._not_finite(episode, int(self._numbers[4]), next_observation, reward)
+        step = Step(
+            episode, observation, proposed, executed, undone, credited,
+            proposed != executed or undone, probability, coin, tie, assistance.row, projected,
+            reward, next_observation, happened,
+        )  # fmt: skip
         if self._rows is not None:
-            what = (when[0], observation, following, event, proposed, executed, credited)
-            how = (proposed != executed, *chosen[2:], known.copy(), projected, reward)
-            self._rows.append(what + how)
-        return following, reward, event, proposed != executed
+            self._rows.append(step._replace(values=assistance.row.copy()))
+        return step, after
+
+    def _environment_step(
+        self, observation: np.ndarray, executed: int, undone: bool
+    ) -> tuple[np.ndarray, float, int, np.ndarray]:
+        """Where an action leads, its reward and events, and the observation after it."""
+        if not undone:
+            next_observation, reward, events = self._stepper.step(executed)
+            return next_observation, reward, events, next_observation
+        stepper: Any = self._stepper
+        if not self._undoes:
+            raise RequestError(
+                f"assistant {self._condition.assistant.name} undoes a step; its rule must be "
+                'registered with needs=("undo",)'
+            )
+        before = stepper.snapshot()
+        next_observation, reward, events = stepper.step(executed)
+        stepper.restore(before)
+        return next_observation, reward, events, observation
 
     def _greedy_episode(self, episode: int) -> tuple[float, int, int]:
-        """Return, length and events of an episode without help, exploration or learning."""
-        stepper, learner, stream = self._stepper, self._learner, self._streams[EVALUATION]
-        _, _, prefer, finite = self._calls[True]
+        """Return, length and events of an unassisted episode without exploration or learning."""
+        stepper, stream = self._stepper, self._streams[EVALUATION]
+        prefer = self._calls[True].preferred
+        learner, actions = (self._settings, self._memory, self._motor), self._task.actions
         limit = self._task.episode_limit
         observation = self._begin(stream, episode)
-        total, events, length = 0.0, 0, 0
-        while length < limit and not events & _ENDED:
-            observation, reward, event = stepper.step(prefer(learner, observation, stream))
-            if not finite(reward, observation):
-                raise self._not_finite(episode, length, observation, reward)
+        action = prefer(*learner, observation, 0.0, -1, actions, False, stream)
+        total, events, length, over = 0.0, 0, 0, False
+        while not over:
+            observation, reward, event = stepper.step(action)
             total += reward
             events |= event
             length += 1
-        return total, length, events
+            over = length == limit or bool(event & _ENDED)
+            action = prefer(*learner, observation, reward, action, actions, over, stream)
+            if action == NOT_FINITE:
+                raise self._not_finite(episode, length - 1, observation, reward)
+        return total, length, events if events & _ENDED else events | LIMIT
 
     def _begin(self, stream: np.ndarray, episode: int) -> np.ndarray:
         observation = self._stepper.reset(draw(stream))
@@ -247,3 +277,19 @@ class _Trial:
             f"task {self._task.name}: trial {self._number}, episode {episode}, step {length + 1}: "
             f"observation {observation.tolist()}, reward {reward}; every number must be finite"
         )
+
+
+def _assistance(condition: Condition) -> NetworkAssistance:
+    values, others = condition.values, condition.others
+    actions = condition.task.actions
+    further = [network.parameters for network in others]
+    return NetworkAssistance(
+        layout=values.layout,
+        parameters=values.parameters,
+        others=np.stack(further) if further else np.zeros((0, 1), np.float32),
+        workspace=np.zeros(values.layout.room(1), np.float32),
+        row=np.zeros(actions),
+        other_rows=np.zeros((len(others), actions)),
+        discount=condition.discount,
+        options=condition.assistant.numbers,
+    )

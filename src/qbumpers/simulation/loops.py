@@ -1,36 +1,108 @@
-"""Trials of tabular learners: an assisted episode, then a greedy one without help, and again.
+"""Trials of tabular learners: an assisted episode, then a greedy unassisted one, and again.
 
-The loops below are plain Python that Numba compiles once for each decision rule. A rule that cannot
-be compiled runs through the same loops uncompiled.
+The loops below are plain Python that Numba compiles once for each decision rule and learner. One
+that cannot be compiled runs through the same loops uncompiled.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
-from qbumpers.assistants.dispatch import decide, observe, start
-from qbumpers.borrowing import borrow, row
-from qbumpers.choice import best_value
-from qbumpers.compilation import INLINE, compiled, compiled_for_session, uncompiled
-from qbumpers.decisions import Noise, Situation, Step, projected_return
-from qbumpers.errors import RequestError
-from qbumpers.learners.perception import Experience, perceive
-from qbumpers.learners.q_learning import QLearner, choose, choose_greedily, learned, scheduled
+from qbumpers.assistants.dispatch import decide, observe, undoes
+from qbumpers.assistants.dispatch import start as start_rule
+from qbumpers.borrowing import borrow, hold, row, rows
+from qbumpers.compilation import compiled, compiled_for_session, inlined, uncompiled
+from qbumpers.decisions import (
+    Execution,
+    Model,
+    Noise,
+    Step,
+    begin,
+    checked_action,
+    settle,
+    situate,
+    step_of,
+)
+from qbumpers.learners.dispatch import begin as begin_learner
+from qbumpers.learners.dispatch import choose, forget, learn, prefer
+from qbumpers.learners.dispatch import start as start_learner
+from qbumpers.learners.interface import Shape
+from qbumpers.learners.motor import move
+from qbumpers.learners.perception import believed, noticing, perceive
 from qbumpers.random_streams import ASSISTANT, ENVIRONMENT, EVALUATION, LEARNER, draw
-from qbumpers.tasks.dynamics import TERMINATED, first_state, transition
+from qbumpers.simulation.outcomes import Sinks
+from qbumpers.tasks.dynamics import LIMIT, TERMINATED, Dynamics, first_state, transition
 
 _WORDS = (0, 0, 0, 0)  # as wide as the state of a stream
 
 
-@register_jitable(**INLINE)
-def _record(record: Any, index: int, episode: int, state: int, led: Any, step: Step) -> None:
-    record.episode[index] = episode
+class Assistance(NamedTuple):
+    """The assistant of a loop.
+
+    Attributes:
+        values: float64 [S, A], Q* by state.
+        others: float64 [S, K, A], the further rows that the rule named.
+        seen: int64 [S], what the assistant sees of each state; None if it sees the state.
+        discount: of the values.
+        options: of the rule, as numbers; their type selects it.
+        width: a tuple of A integers, see `qbumpers.borrowing.row`.
+    """
+
+    values: np.ndarray
+    others: np.ndarray
+    seen: np.ndarray | None
+    discount: float
+    options: Any
+    width: tuple[int, ...]
+
+
+class LearnerStack(NamedTuple):
+    """The learner of a loop: how it learns, and what lies around that.
+
+    Attributes:
+        settings: as numbers; their type selects the learner.
+        perception: as numbers.
+        motor: `Motor`; None if the hand never errs.
+        forgetting: share of the way back to its first memory between episodes; None if 0.
+    """
+
+    settings: Any
+    perception: Any
+    motor: Any
+    forgetting: float | None
+
+
+class When(NamedTuple):
+    """Which episode of which trial.
+
+    Attributes:
+        trial: place of the trial among the outcomes.
+        episode: counted from 0.
+        assisted: whether the assistant is there.
+    """
+
+    trial: int
+    episode: int
+    assisted: bool
+
+
+@inlined
+def _seen(seen: np.ndarray | None, state: int) -> int:
+    """What the assistant sees of a state."""
+    if seen is None:
+        return state
+    return seen[state]
+
+
+@inlined
+def _keep(record: Step | None, index: int, state: int, next_state: int, step: Step) -> None:
+    if record is None:
+        return
+    record.episode[index] = step.episode
     record.state[index] = state
-    record.next_state[index] = led[0]
-    record.events[index] = led[1]
     record.proposed[index] = step.proposed
     record.executed[index] = step.executed
+    record.undone[index] = step.undone
     record.credited[index] = step.credited
     record.overridden[index] = step.overridden
     record.probability[index] = step.probability
@@ -39,198 +111,231 @@ def _record(record: Any, index: int, episode: int, state: int, led: Any, step: S
     record.values[index] = step.values
     record.projected_return[index] = step.projected_return
     record.reward[index] = step.reward
+    record.next_state[index] = next_state
+    record.events[index] = step.events
 
 
-@register_jitable(**INLINE)
+@inlined
+def _count_assisted(counts: Any, state: int, assisted: bool, overridden: bool) -> None:
+    if counts is not None:
+        counts.assisted[state] += assisted
+        counts.overridden[state] += overridden
+
+
+@inlined
+def _count_unassisted(counts: Any, state: int, assisted: bool) -> None:
+    if counts is not None:
+        counts.unassisted[state] += assisted
+
+
+@inlined
+def _is_over(script: Any, recorded: int) -> bool:
+    """Whether a script has been played to its end."""
+    if script is None:
+        return False
+    return recorded >= len(script.proposed)
+
+
+@inlined
+def _propose(
+    script: Any, recorded: int, learner: LearnerStack, memory: Any, state: int, rates: Any,
+    last: int, actions: int, streams: Any,
+) -> tuple[int, Noise]:  # fmt: skip
+    """What the learner proposes, and the assistant's noise; or what a script says."""
+    if script is None:
+        meant = choose(learner.settings, memory, state, rates, streams[LEARNER])
+        proposed = move(learner.motor, meant, last, actions, streams[LEARNER])
+        noise = streams[ASSISTANT]
+        return proposed, Noise(draw(noise), draw(noise))
+    return script.proposed[recorded], Noise(script.coin[recorded], script.tie[recorded])
+
+
+@inlined
 def _chance(possibilities: int, stream: Any) -> float:
-    """A number that chooses among possibilities, drawn only where there is a choice."""
+    """A number that chooses among possibilities, drawn only if there is a choice."""
     return draw(stream) if possibilities > 1 else 0.0
 
 
-@register_jitable(**INLINE)
-def _learn(
-    own_values: np.ndarray,
-    state: int,
-    experience: Experience,
-    event: int,
-    next_state: int,
-    learner: QLearner,
-    learning_rate: float,
-    width: Any,
-) -> None:
-    if experience.action < 0:
-        return
-    future = 0.0
-    if not event & TERMINATED:
-        future = learner.discount * best_value(row(own_values, next_state, width))
-    values = row(own_values, state, width)
-    values[experience.action] = learned(
-        values[experience.action], experience.reward, future, learning_rate
-    )
+@inlined
+def _happened(event: int, undone: bool, last: bool) -> int:
+    """Events of a step: an undone one ends nothing, and the last one that is allowed does."""
+    events = event & ~TERMINATED if undone else event
+    return events | LIMIT if last and not events & TERMINATED else events
 
 
-@register_jitable(**INLINE)
+@inlined
 def _assisted_episode(
-    dynamics, values, gamma, own_values, learner, perception, options, memory, streams, width,
-    rates, helped, outcomes, place, counts, record, recorded, script,
-):  # fmt: skip
-    """One training episode; returns the rule's memory and how many steps there are so far."""
-    explore, chance, nature = streams[LEARNER], streams[ASSISTANT], streams[ENVIRONMENT]
-    epsilon, learning_rate = rates
+    dynamics: Dynamics, assistance: Assistance, learner: LearnerStack, memory: Any, rates: Any,
+    rule_memory: Any, streams: Any, when: When, sinks: Sinks, recorded: int,
+) -> tuple[Any, int]:  # fmt: skip
+    """One episode of training; returns the rule's memory and how many steps there are so far."""
+    nature, width = streams[ENVIRONMENT], assistance.width
     state = first_state(dynamics, _chance(len(dynamics.start_states), nature))
-    start_value = best_value(row(values, state, width))
-    earned, discount, total = 0.0, 1.0, 0.0
-    overrides, events, length = 0, 0, 0
-    while length < dynamics.episode_limit:
-        if script is None:
-            own_row = row(own_values, state, width)
-            proposed = choose(own_row, epsilon, draw(explore), draw(explore))
-            noise = Noise(draw(chance), draw(chance))
-        else:
-            if recorded >= len(script.proposed):
-                break
-            proposed = script.proposed[recorded]
-            noise = Noise(script.coin[recorded], script.tie[recorded])
-        known = row(values, state, width)
-        situation = Situation(known, proposed, earned, discount, start_value)
-        executed, probability = proposed, 0.0
-        if helped:
-            decision = decide(situation, noise, options, memory)
-            executed, probability = int(decision.action), float(decision.probability)
-        if not 0 <= executed < dynamics.actions:
-            raise RequestError("the assistant's rule chose an action outside the action space")
-        index = transition(dynamics, state, executed, _chance(dynamics.outcomes, nature))
-        reward, event = dynamics.reward[index], dynamics.events[index]
-        next_state = dynamics.next_state[index]
-        experience = perceive(perception, proposed, executed, reward, learner.penalty)
-        step = Step(
-            proposed, executed, experience.action, executed != proposed,
-            probability, noise.coin, noise.tie, known,
-            projected_return(earned, discount, known[proposed]), reward,
+    account = begin(row(assistance.values, state, width), when.episode)
+    total, overrides, events, length, last = 0.0, 0, 0, 0, -1
+    while length < dynamics.episode_limit and not _is_over(sinks.script, recorded):
+        proposed, noise = _propose(
+            sinks.script, recorded, learner, memory, state, rates, last, dynamics.actions, streams
+        )
+        situation = situate(
+            account, _seen(assistance.seen, state), row(assistance.values, state, width),
+            rows(assistance.others, state, width), proposed,
         )  # fmt: skip
-        if helped:
-            memory = observe(memory, step, options)
-        _learn(own_values, state, experience, event, next_state, learner, learning_rate, width)
-        if counts is not None:
-            counts.assisted[state] += helped
-            counts.overridden[state] += step.overridden
-        if record is not None:
-            _record(record, recorded, place[1], state, (next_state, event), step)
-        recorded += 1
-        earned += discount * reward
-        discount *= gamma
-        total += reward
-        overrides += step.overridden
-        events |= event
+        execution = Execution(proposed, False, 0.0)
+        if when.assisted:
+            decision = decide(situation, noise, assistance.options, rule_memory)
+            execution = Execution(
+                checked_action(int(decision.action), dynamics.actions), undoes(decision),
+                float(decision.probability),
+            )  # fmt: skip
+        index = transition(dynamics, state, execution.executed, _chance(dynamics.outcomes, nature))
+        reward, event = dynamics.reward[index], int(dynamics.events[index])
+        next_state = dynamics.next_state[index]
+        overridden = execution.executed != proposed or execution.undone
+        experience = perceive(
+            learner.perception, proposed, execution.executed, execution.undone, reward,
+            noticing(learner.perception, overridden, streams[LEARNER]),
+        )  # fmt: skip
         length += 1
-        state = next_state
-        if event & TERMINATED:
+        happened = _happened(event, execution.undone, length == dynamics.episode_limit)
+        step = step_of(
+            situation, noise, execution, experience.action, reward,
+            _seen(assistance.seen, next_state), happened,
+        )  # fmt: skip
+        if when.assisted:
+            rule_memory = observe(rule_memory, step, assistance.options)
+        if experience.action >= 0:
+            learn(
+                learner.settings, memory,
+                believed(experience, state, next_state, event & TERMINATED != 0), rates,
+                streams[LEARNER],
+            )  # fmt: skip
+        _count_assisted(sinks.counts, state, when.assisted, overridden)
+        _keep(sinks.record, recorded, state, next_state, step)
+        recorded += 1
+        account = settle(account, reward, assistance.discount)
+        total += reward
+        overrides += overridden
+        events |= happened
+        last = proposed
+        if happened & TERMINATED:
             break
+        if not execution.undone:
+            state = next_state
+    outcomes, place = sinks.outcomes, (when.trial, when.episode)
     outcomes.assisted_return[place] = total
     outcomes.assisted_length[place] = length
     outcomes.overrides[place] = overrides
     outcomes.assisted_events[place] = events
-    return memory, recorded
+    return rule_memory, recorded
 
 
-@register_jitable(**INLINE)
-def _greedy_episode(dynamics, own_values, stream, width, helped, outcomes, place, counts):
-    """One episode without help, exploration or learning."""
+@inlined
+def _greedy_episode(
+    dynamics: Dynamics, learner: LearnerStack, memory: Any, stream: Any, when: When, sinks: Sinks
+) -> None:
+    """One unassisted episode, without exploration or learning."""
     state = first_state(dynamics, _chance(len(dynamics.start_states), stream))
-    total, events, length = 0.0, 0, 0
+    total, events, length, last = 0.0, 0, 0, -1
     while length < dynamics.episode_limit:
-        action = choose_greedily(row(own_values, state, width), draw(stream))
-        if counts is not None:
-            counts.unassisted[state] += helped
-        index = transition(dynamics, state, action, _chance(dynamics.outcomes, stream))
+        meant = prefer(learner.settings, memory, state, draw(stream))
+        last = move(learner.motor, meant, last, dynamics.actions, stream)
+        _count_unassisted(sinks.counts, state, when.assisted)
+        index = transition(dynamics, state, last, _chance(dynamics.outcomes, stream))
         total += dynamics.reward[index]
-        events |= dynamics.events[index]
         length += 1
         state = dynamics.next_state[index]
-        if dynamics.events[index] & TERMINATED:
+        events |= _happened(int(dynamics.events[index]), False, length == dynamics.episode_limit)
+        if events & TERMINATED:
             break
+    outcomes, place = sinks.outcomes, (when.trial, when.episode)
     outcomes.unassisted_return[place] = total
     outcomes.unassisted_length[place] = length
     outcomes.unassisted_events[place] = events
 
 
-@register_jitable(**INLINE)
-def _begin(own_streams: np.ndarray, streams: np.ndarray, trial: int, episode: int) -> None:
+@inlined
+def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int) -> None:
     """Copy streams, number by number: copying slices takes Numba far longer to compile."""
-    for source in range(own_streams.shape[0]):
-        for word in range(own_streams.shape[1]):
-            own_streams[source, word] = streams[trial, episode, source, word]
+    for source in range(own.shape[0]):
+        for word in range(own.shape[1]):
+            own[source, word] = streams[trial, episode, source, word]
+
+
+@inlined
+def _fresh_memory(forgetting: float | None, settings: Any, shape: Shape, stream: Any) -> Any:
+    """A learner's first memory once more, if anything is to be forgotten."""
+    if forgetting is None:
+        return 0
+    return start_learner(settings, shape, stream.copy())
+
+
+@inlined
+def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
+    if forgetting is None:
+        return
+    if episode > 0:
+        forget(memory, fresh, forgetting)
 
 
 @compiled
 def run_trials(
-    dynamics, values, gamma, learner, perception, options, streams, retention, width, own_values,
-    outcomes, counts, record, script,
-):  # fmt: skip
+    model: Model, assistance: Assistance, learner: LearnerStack, streams: np.ndarray,
+    retention: int, sinks: Sinks,
+) -> int:  # fmt: skip
     """Run trials one after another.
 
     In the last `retention` episodes the assistant is gone: the learner goes on by itself, with the
     exploration and learning rate that the schedules end with.
 
     Args:
-        dynamics: the task.
-        values: float64 [S, A], Q* of the assistant.
-        gamma: discount of those values.
-        learner: the simulated person.
-        perception: what they believe happened.
-        options: of the assistant; their type selects its rule.
+        model: of the task, with its dynamics.
+        assistance: of the trials.
+        learner: that is simulated.
         streams: uint64 [T, 1, 4, 4] or, to begin anew in every episode, [T, E, 4, 4], see
             `qbumpers.random_streams`.
         retention: R, of the E episodes.
-        width: a tuple of A integers, see `qbumpers.borrowing.row`.
-        own_values: float64 [S, A], room for the learner's values; overwritten.
-        outcomes: `Outcomes` of arrays [T, E], filled.
-        counts: `StateCounts`, added to; or None.
-        record: `Steps` with room for every assisted step, filled; or None.
-        script: `Script` to be played again; or None.
+        sinks: what is to be filled.
 
     Returns:
-        Number of assisted steps.
+        Number of steps of training.
 
     Raises:
-        RequestError: where the rule chooses an action that there is not.
+        RequestError: if the rule chooses an action that there is not.
     """
-    trials, episodes = outcomes.assisted_return.shape
+    trials, episodes = sinks.outcomes.assisted_return.shape
     training = episodes - retention
-    dynamics, values, own_values = borrow(dynamics), borrow(values), borrow(own_values)
-    outcomes, counts = borrow(outcomes), borrow(counts)
-    record, script = borrow(record), borrow(script)
-    own_streams = np.empty((4, 4), np.uint64)
-    rows = borrow(own_streams)
-    trial_streams = (
-        row(rows, 0, _WORDS),
-        row(rows, 1, _WORDS),
-        row(rows, 2, _WORDS),
-        row(rows, 3, _WORDS),
+    shape = Shape(model.states, 0, assistance.width)
+    dynamics, help_given, kept = borrow(model.dynamics), borrow(assistance), borrow(sinks)
+    own = np.empty((4, 4), np.uint64)
+    borrowed = borrow(own)
+    own_streams = (
+        row(borrowed, 0, _WORDS),
+        row(borrowed, 1, _WORDS),
+        row(borrowed, 2, _WORDS),
+        row(borrowed, 3, _WORDS),
     )
     recorded = 0
     for trial in range(trials):
-        own_values[:] = learner.initial_value
-        memory = start(options)
+        _copy_streams(own, streams, trial, 0)
+        fresh = _fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
+        held = start_learner(learner.settings, shape, own_streams[LEARNER])
+        memory = borrow(held)
+        rule_memory = start_rule(assistance.options, model)
         for episode in range(episodes):
-            if episode == 0 or streams.shape[1] > 1:
-                _begin(own_streams, streams, trial, episode)
-            helped = episode < training
-            rates = (
-                scheduled(learner.epsilon, episode, training),
-                scheduled(learner.learning_rate, episode, training),
-            )
-            memory, recorded = _assisted_episode(
-                dynamics, values, gamma, own_values, learner, perception, options, memory,
-                trial_streams, width, rates, helped, outcomes, (trial, episode),
-                counts, record, recorded, script,
+            if episode > 0 and streams.shape[1] > 1:
+                _copy_streams(own, streams, trial, episode)
+            when = When(trial, episode, episode < training)
+            _forget(learner.forgetting, memory, fresh, episode)
+            rates = begin_learner(learner.settings, memory, episode, training)
+            rule_memory, recorded = _assisted_episode(
+                dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,
+                recorded,
             )  # fmt: skip
-            _greedy_episode(
-                dynamics, own_values, trial_streams[EVALUATION], width, helped, outcomes,
-                (trial, episode), counts,
-            )  # fmt: skip
+            _greedy_episode(dynamics, learner, memory, own_streams[EVALUATION], when, kept)
+        hold(held)
     return recorded
 
 
 run_trials_for_session = compiled_for_session(uncompiled(run_trials))
-"""The same loops for rules from outside the package, whose sources may change at any time."""
+"""The same loops for rules and learners from outside the package, which may change at any time."""

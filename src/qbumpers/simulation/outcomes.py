@@ -1,8 +1,10 @@
 """What simulations find: outcomes by episode, counts by state, and records of single steps."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from qbumpers.decisions import Step
 
 
 class Outcomes(NamedTuple):
@@ -41,35 +43,55 @@ class StateCounts(NamedTuple):
     unassisted: np.ndarray
 
 
-class Steps(NamedTuple):
-    """Arrays [N] of step records, in order; `decisions.Step` says what each means.
-
-    `state` is where the step began and `next_state` where it led, numbers [N] or vectors [N, D];
-    `events` are bits of `qbumpers.tasks.dynamics`; `values` is [N, A]; `episode` counts from 0.
-    """
-
-    episode: np.ndarray
-    state: np.ndarray
-    next_state: np.ndarray
-    events: np.ndarray
-    proposed: np.ndarray
-    executed: np.ndarray
-    credited: np.ndarray
-    overridden: np.ndarray
-    probability: np.ndarray
-    coin: np.ndarray
-    tie: np.ndarray
-    values: np.ndarray
-    projected_return: np.ndarray
-    reward: np.ndarray
-
-
 class Script(NamedTuple):
     """Recorded proposals and noise, to be played again instead of drawing new ones: arrays [N]."""
 
     proposed: np.ndarray
     coin: np.ndarray
     tie: np.ndarray
+
+
+class Sinks(NamedTuple):
+    """What a simulation fills, and what it plays again.
+
+    Attributes:
+        outcomes: `Outcomes` of arrays [T, E].
+        counts: `StateCounts`, added to; or None.
+        record: `Step` of arrays [N] with room for every step of training, filled; or None.
+        script: `Script` to be played again; or None.
+    """
+
+    outcomes: Any
+    counts: Any
+    record: Any
+    script: Any
+
+
+def room_for_steps(most: int, state: np.ndarray, actions: int) -> Step:
+    """A table of steps to be filled.
+
+    Args:
+        most: N, steps that there is room for.
+        state: a state as the table keeps it: int64 [], or float32 [D].
+        actions: A.
+
+    Returns:
+        `Step` of arrays [N].
+    """
+    whole = {name: np.zeros(most, np.int64) for name in ("episode", "proposed", "executed")}
+    real = {name: np.zeros(most) for name in ("probability", "coin", "tie", "reward")}
+    return Step(
+        **whole,
+        **real,
+        credited=np.zeros(most, np.int64),
+        undone=np.zeros(most, np.bool_),
+        overridden=np.zeros(most, np.bool_),
+        projected_return=np.zeros(most),
+        values=np.zeros((most, actions)),
+        state=np.zeros((most, *state.shape), state.dtype),
+        next_state=np.zeros((most, *state.shape), state.dtype),
+        events=np.zeros(most, np.uint8),
+    )
 
 
 class Simulation(NamedTuple):

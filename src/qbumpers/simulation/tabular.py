@@ -1,75 +1,54 @@
-"""Simulated people at tabular tasks: thousands of trials in seconds."""
+"""Simulated learners at tasks with a table: thousands of trials in seconds."""
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from qbumpers.compilation import uncompiled
-from qbumpers.learners import perception as named_perception
-from qbumpers.simulation.condition import Condition, outcome_room, streams
-from qbumpers.simulation.loops import run_trials, run_trials_for_session
-from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
-from qbumpers.tasks import TabularTask
+from qbumpers.decisions import Step
+from qbumpers.simulation.condition import Condition, compiled_learner, outcome_room, streams
+from qbumpers.simulation.loops import (
+    Assistance,
+    LearnerStack,
+    run_trials,
+    run_trials_for_session,
+)
+from qbumpers.simulation.outcomes import Script, Simulation, Sinks, StateCounts, room_for_steps
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     """Simulate trials of a condition, one after another in compiled code."""
     outcomes = outcome_room(condition, len(trials))
-    states = cast(TabularTask, condition.task).states
-    counts = StateCounts(*(np.zeros(states, np.int64) for _ in range(3)))
-    _call_loops(condition, trials, seed, outcomes, counts, None, None)
+    counts = StateCounts(*(np.zeros(condition.task.states, np.int64) for _ in range(3)))
+    _call_loops(condition, trials, seed, Sinks(outcomes, counts, None, None))
     return Simulation(outcomes, counts)
 
 
-def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Steps:
-    """Every assisted step of one trial; `qbumpers.simulation.record` says more."""
+def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Step:
+    """Every step of training of one trial; `qbumpers.simulation.record` says more."""
     most = (condition.episodes + condition.retention) * condition.task.episode_limit
-    steps = Steps(
-        episode=np.zeros(most, np.int64),
-        state=np.zeros(most, np.int64),
-        next_state=np.zeros(most, np.int64),
-        events=np.zeros(most, np.uint8),
-        proposed=np.zeros(most, np.int64),
-        executed=np.zeros(most, np.int64),
-        credited=np.zeros(most, np.int64),
-        overridden=np.zeros(most, np.bool_),
-        probability=np.zeros(most),
-        coin=np.zeros(most),
-        tie=np.zeros(most),
-        values=np.zeros((most, condition.task.actions)),
-        projected_return=np.zeros(most),
-        reward=np.zeros(most),
-    )
-    used = _call_loops(condition, trials, seed, outcome_room(condition, 1), None, steps, script)
-    return Steps(*(array[:used] for array in steps))
+    steps = room_for_steps(most, np.zeros((), np.int64), condition.task.actions)
+    sinks = Sinks(outcome_room(condition, 1), None, steps, script)
+    used = _call_loops(condition, trials, seed, sinks)
+    return Step(*(array[:used] for array in steps))
 
 
-def _call_loops(
-    condition: Condition,
-    trials: range,
-    seed: int,
-    outcomes: Outcomes,
-    counts: StateCounts | None,
-    steps: Steps | None,
-    script: Script | None,
-) -> int:
-    rule = condition.assistant.rule
-    loops: Any = run_trials if rule.built_in else run_trials_for_session
-    if not rule.compiled:
+def _call_loops(condition: Condition, trials: range, seed: int, sinks: Sinks) -> int:
+    assistant, learner = condition.assistant, condition.learner_type
+    built_in = assistant.built_in and learner.built_in
+    loops: Any = run_trials if built_in else run_trials_for_session
+    if not (assistant.compiled and learner.compiled):
         loops = uncompiled(run_trials)
+    task = condition.task
+    seen = None if task.seen is None else np.ascontiguousarray(task.seen, np.int64)
     return loops(
-        cast(TabularTask, condition.task).dynamics(),
-        condition.values,
-        condition.discount,
-        condition.learner,
-        named_perception(condition.perception),
-        condition.assistant.options,
+        condition.model(),
+        Assistance(
+            condition.values, condition.others, seen, condition.discount, assistant.numbers,
+            (0,) * task.actions,
+        ),
+        LearnerStack(*compiled_learner(condition)),
         streams(condition, trials, seed),
         condition.retention,
-        (0,) * condition.task.actions,
-        np.empty_like(condition.values),
-        outcomes,
-        counts,
-        steps,
-        script,
-    )
+        sinks,
+    )  # fmt: skip

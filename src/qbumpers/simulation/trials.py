@@ -1,55 +1,43 @@
-"""Simulated people at any task: `simulate`, and its parts for prepared conditions."""
+"""Simulated learners at any task: `simulate`, and its parts for prepared conditions."""
 
 import itertools
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
-from qbumpers.learners import DoubleDQN, QLearner
 from qbumpers.simulation import deep, tabular
-from qbumpers.simulation.condition import Condition, make_condition
-from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, Steps
+from qbumpers.simulation.condition import Condition, Setup, make_condition
+from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
 from qbumpers.simulation.workers import make_pool, some_finished, submit
-from qbumpers.tasks import TabularTask, Task
-from qbumpers.values import QValues
+from qbumpers.tasks import Task
 
 
 def simulate(
     task: Task,
     assistant: Assistant | str,
     *,
-    values: QValues | None = None,
-    learner: QLearner | DoubleDQN | None = None,
-    perception: str = "transition",
-    episodes: int = 100,
-    retention: int = 0,
-    common_random_numbers: bool = False,
     trials: int | range = 100,
     seed: int = 0,
     workers: int = 1,
+    **setup: Unpack[Setup],
 ) -> Simulation:
-    """Simulate people who learn a task with an assistant's help (Section 4.2).
+    """Simulate learners who learn a task with an assistant (Section 4.2).
 
-    A trial is one person: `episodes` times an assisted episode from which they learn, then a greedy
-    one without help from which they do not. Equal arguments give equal numbers, whatever the
-    number of workers and whichever trials are run together.
+    A trial is one learner: `episodes` times an assisted episode from which it learns, then a greedy
+    unassisted one from which it does not. Equal arguments give equal numbers, whatever the number
+    of workers and whichever trials are run together.
 
     Args:
-        task: the task.
+        task: what is to be learned.
         assistant: an assistant, or the name of one that needs no options.
-        values: Q* of the assistant; where None, the exact solution of a tabular task.
-        learner: the simulated person; where None, the paper's, with the task's discount.
-        perception: name of a learner model, see `qbumpers.learners.PERCEPTIONS`.
-        episodes: of a trial, at least 1.
-        retention: further episodes in which the learner goes on without the assistant, each
-            followed by a greedy one.
-        common_random_numbers: whether trials of equal number draw equal numbers in every condition.
         trials: how many, at least 1; or which.
         seed: of the experiment, not negative.
-        workers: threads, or processes where observations are vectors; a script that asks for
-            several of those must guard its start with `if __name__ == "__main__"`.
+        workers: threads, or processes if a task steps in Python; a script that asks for several of
+            those must guard its start with `if __name__ == "__main__"`.
+        **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
 
     Returns:
         Outcomes by trial and episode, and counts by state.
@@ -57,16 +45,7 @@ def simulate(
     Raises:
         RequestError: as `make_condition`, and for a number of trials below 1 or a negative seed.
     """
-    condition = make_condition(
-        task,
-        assistant,
-        values=values,
-        learner=learner,
-        perception=perception,
-        episodes=episodes,
-        retention=retention,
-        common_random_numbers=common_random_numbers,
-    )
+    condition = make_condition(task, assistant, **setup)
     return run(condition, trials=trials, seed=seed, workers=workers)
 
 
@@ -96,7 +75,7 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
 
 
 def _engine(task: Task) -> Any:
-    return tabular if isinstance(task, TabularTask) else deep
+    return tabular if task.states else deep
 
 
 def _joined(blocks: list[Simulation]) -> Simulation:
@@ -111,8 +90,8 @@ def _joined(blocks: list[Simulation]) -> Simulation:
 
 def record(
     condition: Condition, *, trial: int = 0, seed: int = 0, script: Script | None = None
-) -> Steps:
-    """Every assisted step of one trial.
+) -> Step:
+    """Every step of training of one trial.
 
     Args:
         condition: what to simulate.
@@ -122,10 +101,10 @@ def record(
             the trial ends with the script.
 
     Returns:
-        Step records, arrays [N].
+        A table of steps: `Step` of arrays [N].
 
     Raises:
-        RequestError: where the trial, the seed or the script is out of range.
+        RequestError: if the trial, the seed or the script is out of range.
     """
     if script is not None:
         _check_script(script, condition.task.actions)

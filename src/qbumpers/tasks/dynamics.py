@@ -7,7 +7,7 @@ from numba.extending import register_jitable
 
 from qbumpers.compilation import INLINE, compiled_apart
 
-TERMINATED, SUCCESS, CRASH, TRUNCATED = 1, 2, 4, 8
+TERMINATED, SUCCESS, CRASH, TRUNCATED, LIMIT = 1, 2, 4, 8, 16
 """Bits of the events of a step; TRUNCATED where an environment stops by itself, not at its end."""
 
 

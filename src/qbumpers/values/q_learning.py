@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from qbumpers.borrowing import borrow, row
-from qbumpers.choice import best_value
+from qbumpers.borrowing import borrow
 from qbumpers.compilation import compiled
 from qbumpers.errors import RequestError
-from qbumpers.learners.q_learning import QLearner, choose, learned, scheduled
+from qbumpers.learners import q_learning
+from qbumpers.learners.interface import Table, Transition
+from qbumpers.learners.q_learning import QLearner
 from qbumpers.random_streams import ENVIRONMENT, LEARNER, draw, trial_streams
 from qbumpers.tasks.dynamics import TERMINATED, Dynamics, first_state, transition
 from qbumpers.tasks.tabular import TabularTask
@@ -59,19 +60,18 @@ def _learn(
     width: tuple[int, ...],
     table: np.ndarray,
 ) -> None:
-    dynamics, table = borrow(dynamics), borrow(table)
+    dynamics, memory = borrow(dynamics), Table(borrow(table), width)
     explore, nature = streams[LEARNER], streams[ENVIRONMENT]
     for episode in range(episodes):
-        epsilon = scheduled(learner.epsilon, episode, episodes)
-        learning_rate = scheduled(learner.learning_rate, episode, episodes)
+        rates = q_learning.begin(learner, memory, episode, episodes)
         state = first_state(dynamics, draw(nature))
         for _ in range(dynamics.episode_limit):
-            values = row(table, state, width)
-            action = choose(values, epsilon, draw(explore), draw(explore))
+            action = q_learning.choose(learner, memory, state, rates, explore)
             index = transition(dynamics, state, action, draw(nature))
-            ended = dynamics.events[index] & TERMINATED
-            state = dynamics.next_state[index]
-            future = 0.0 if ended else learner.discount * best_value(row(table, state, width))
-            values[action] = learned(values[action], dynamics.reward[index], future, learning_rate)
+            ended = dynamics.events[index] & TERMINATED != 0
+            next_state, reward = dynamics.next_state[index], dynamics.reward[index]
+            happened = Transition(state, action, reward, next_state, ended, -1)
+            q_learning.learn(learner, memory, happened, rates, explore)
+            state = next_state
             if ended:
                 break

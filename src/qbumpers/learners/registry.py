@@ -1,0 +1,172 @@
+"""Learners by name: registering one, and checking the settings of one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+
+from qbumpers.compilation import is_of_package, result_type, type_of
+from qbumpers.errors import RequestError, checked, unknown_name
+from qbumpers.learners.interface import Shape, Transition
+from qbumpers.registration import checked_class, compiled_or_plain, fresh_class, sample
+
+Observes = Literal["states", "vectors"]
+
+
+@dataclass(frozen=True)
+class LearnerType:
+    """A kind of learner as registered; `register_learner` says what its functions are.
+
+    Attributes:
+        name: how users name it.
+        settings_type: the NamedTuple of its settings; it also selects it in compiled code.
+        observes: "states" by number, or "vectors".
+        compiled: whether Numba could compile all of it.
+        built_in: whether it belongs to this package, whose compiled code is kept on disk.
+    """
+
+    name: str
+    settings_type: type
+    start: Callable[..., Any]
+    choose: Callable[..., int]
+    prefer: Callable[..., int]
+    policy: Callable[..., None]
+    learn: Callable[..., None]
+    begin: Callable[..., Any] | None
+    observes: Observes
+    compiled: bool
+    built_in: bool
+
+
+_learners: dict[str, LearnerType] = {}
+_learners_by_settings: dict[type, LearnerType] = {}
+
+
+def register_learner(
+    name: str,
+    settings_type: type,
+    *,
+    start: Callable[..., Any],
+    choose: Callable[..., int],
+    prefer: Callable[..., int],
+    policy: Callable[..., None],
+    learn: Callable[..., None],
+    begin: Callable[..., Any] | None = None,
+    observes: Observes = "states",
+) -> type:
+    """Register a learner under a name; it then works in every simulator, in files and in `list`.
+
+    Args:
+        name: how users will name it.
+        settings_type: a NamedTuple class of numbers, tuples, `Literal` texts, `Schedule`s and other
+            NamedTuples of them, every field with a default. Bounds written as
+            `Annotated[float, Field(ge=0, le=1)]` are checked before anything runs. A field
+            `discount` is the task's if it is left out.
+        start: `(settings, shape, stream) -> memory`, before the first episode; `shape` is a
+            `qbumpers.learners.interface.Shape`, `stream` uint64 [4] draws what is left to chance.
+            The memory is a NamedTuple of arrays, which change in place, and numbers. Of a learner
+            of vectors, `start` and `begin` are called from Python.
+        choose: `(settings, memory, state, rates, stream) -> action`, in training.
+        prefer: `(settings, memory, state, tie) -> action`, in an unassisted probe; `tie` in [0, 1)
+            chooses among equals.
+        policy: `(settings, memory, state, rates, out)`, writes the probabilities of `choose` into
+            `out`, float64 [A].
+        learn: `(settings, memory, transition, rates, stream)`, changes the memory after a step from
+            which it learns; `transition` is a `qbumpers.learners.interface.Transition`.
+        begin: `(settings, memory, episode, episodes) -> rates`, the numbers of an episode, for
+            instance a `qbumpers.learners.interface.Rates`; 0 if there is none.
+        observes: "states" by number, or "vectors", float32 [D].
+
+    Returns:
+        The class of its settings, with which `simulate` takes it: call it with fields by name.
+
+    Raises:
+        RequestError: if `settings_type` is no NamedTuple class or a field has no default.
+    """
+    checked_class(settings_type, f"settings_type of {name!r}")
+    missing = set(settings_type._fields) - set(settings_type._field_defaults)  # type: ignore[attr-defined]
+    if missing:
+        raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
+    functions = (start, choose, prefer, policy, learn, begin)
+    built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
+    compiled = True
+    if not built_in:
+        settings_type = fresh_class(settings_type)
+        attempt = partial(_compile_once, settings_type, observes)
+        functions, compiles_for = compiled_or_plain(
+            f"learner {name!r}", functions, {observes: attempt}
+        )
+        compiled = bool(compiles_for)
+    start, choose, prefer, policy, learn, begin = functions  # type: ignore[assignment]
+    learner = LearnerType(
+        name, settings_type, start, choose, prefer, policy, learn, begin, observes, compiled,
+        built_in,
+    )  # fmt: skip
+    _learners[name] = learner
+    _learners_by_settings[settings_type] = learner
+    return settings_type
+
+
+def _compile_once(
+    settings_type: type, observes: Observes, start: Any, choose: Any, prefer: Any, policy: Any,
+    learn: Any, begin: Any,
+) -> None:  # fmt: skip
+    """Compile a learner for the types that every host passes, without calling it."""
+    states = observes == "states"
+    state = 0 if states else np.zeros(1, np.float32)
+    settings = type_of(sample(settings_type))
+    stream, real, whole = type_of(np.zeros(4, np.uint64)), type_of(0.0), type_of(0)
+    shape = Shape(1, 0, (0, 0)) if states else Shape(0, 1, (0, 0))
+    memory = result_type(start, settings, type_of(shape), stream)
+    rates = result_type(begin, settings, memory, whole, whole) if begin else whole
+    arguments = (settings, memory, type_of(state), rates)
+    for function, last in ((choose, stream), (policy, type_of(np.zeros(2)))):
+        result_type(function, *arguments, last)
+    result_type(prefer, settings, memory, type_of(state), real)
+    transition = type_of(Transition(state, 0, 0.0, state, False, -1))
+    result_type(learn, settings, memory, transition, rates, stream)
+
+
+def learners() -> dict[str, LearnerType]:
+    """Every registered kind of learner by name, in the order of registration."""
+    return dict(_learners)
+
+
+def learner_type(name: str) -> LearnerType:
+    """The kind of learner of that name.
+
+    Raises:
+        RequestError: if there is none.
+    """
+    if name not in _learners:
+        raise unknown_name("learner", name, _learners)
+    return _learners[name]
+
+
+def learner_for_settings(settings_type: type) -> LearnerType:
+    """The kind of learner that settings of this class belong to.
+
+    Raises:
+        RequestError: if they belong to none.
+    """
+    if settings_type not in _learners_by_settings:
+        raise RequestError(f"learner = {settings_type.__name__}: no learner has such settings")
+    return _learners_by_settings[settings_type]
+
+
+def make_learner(name: str, **settings: Any) -> Any:
+    """The settings of a learner, checked.
+
+    Args:
+        name: a registered name, for instance "q-learning".
+        **settings: its fields, for instance `discount=0.99`; tables for those that are NamedTuples.
+
+    Returns:
+        An instance of its class of settings.
+
+    Raises:
+        RequestError: if the name is unknown, or a field is unknown or out of range.
+    """
+    return checked(learner_type(name).settings_type, settings, f"learner {name}")
