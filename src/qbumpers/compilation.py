@@ -66,7 +66,7 @@ def compiled(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Let compiled code call a function of this package as a piece of itself; Python calls it as is.
+    """Make a function a piece of the compiled code that calls it; Python calls it as it is.
 
     Args:
         function: a function in Numba's subset of Python.
@@ -173,5 +173,5 @@ def is_compiled(function: Any) -> bool:
 
 
 def is_of_package(function: Any) -> bool:
-    """Whether a function is compiled and belongs to this package: kept on disk between processes."""
+    """Whether a function is compiled and of this package, and so kept on disk."""
     return is_compiled(function) and function.__module__.startswith("qbumpers.")

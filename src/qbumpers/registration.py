@@ -58,7 +58,9 @@ def compiled_or_plain(
     Returns:
         The functions, and what they compile for: nothing if they are plain Python.
     """
-    session = tuple(f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions)
+    session = tuple(
+        f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
+    )
     reason = ""
     for kind, attempt in attempts.items():
         try:

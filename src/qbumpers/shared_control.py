@@ -1,26 +1,25 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import Any, SupportsFloat, cast
 
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from qbumpers.assistants import Assistant, make_assistant
-from qbumpers.compilation import uncompiled
-from qbumpers.decisions import Noise, Situation, Step, projected_return
+from qbumpers.decisions import Model, Noise, Step
 from qbumpers.errors import RequestError
-from qbumpers.learners import perceive
-from qbumpers.learners import perception as named_perception
-from qbumpers.values import QValues, check_width, load_values
+from qbumpers.learners import Perception
+from qbumpers.session import Session
+from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
+from qbumpers.tasks.undoing import reached_limit, undo_of
+from qbumpers.values import QValues, load_values
 
 RECORD, SUMMARY = "assistance", "assisted_episode"
 """Keys of `info`: the record of every step, and the summary at the end of an episode."""
 
 _NOISE_DRAWN = 256  # decisions for which noise is drawn at a time
-
-_perceive, _projected_return = uncompiled(perceive), uncompiled(projected_return)
 
 
 class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -38,16 +37,16 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     Args:
         env: an environment with a Discrete action space.
         assistant: an assistant, or the name of one, its options then being given by `options`.
-        values: Q* of the assistant, any callable from an observation to one value an action; or
+        values: Q* of the assistant, any callable from an observation to one value per action; or
             the path of a file written by `TabularValues.save`.
-        discount: of the values, in (0, 1]; needed where the values do not state their own.
-        perception: learner model for the record's `credited` action.
+        discount: of the values, in (0, 1]; needed if the values do not state their own.
+        perception: learner model for the record's `credited` action, a `Perception` or its name.
         **options: of the assistant, for instance `alpha=0.7`.
 
     Raises:
-        RequestError: where the action space is not Discrete, or an argument is unknown, missing or
-            out of range. `reset` raises it where the values do not fit the environment or the
-            assistant's options do not suit the episode.
+        RequestError: if the action space is not Discrete, an argument is unknown, missing or out of
+            range, or the environment lacks what the assistant needs. `reset` raises it if the
+            values do not fit the environment or the assistant's options do not suit the episode.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         values: QValues | str | Path,
         *,
         discount: float | None = None,
-        perception: str = "transition",
+        perception: Perception | str = "transition",
         **options: Any,
     ) -> None:
         RecordConstructorArgs.__init__(
@@ -79,14 +78,38 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         )
         self.values: QValues = load_values(values) if isinstance(values, str | Path) else values
         self.discount = _discount_of(self.values, discount)
-        self.perception = named_perception(perception)
+        self.perception = perception
         self._actions = int(env.action_space.n)
         self._first_action = int(env.action_space.start)
         self._generator = np.random.Generator(np.random.SFC64())
         self._noise: list[list[float]] = []
-        self._recorded: list[list[float]] = []
-        self._memory = self.assistant.start()
-        self._row: np.ndarray | None = None
+        self._recorded: list[list[float]] | None = None
+        self._undo = undo_of(env) if "undo" in self.assistant.needs else None
+        self._session = Session(self.assistant, self.values, self._model(), perception)
+
+    def _model(self) -> Model:
+        """What the rule may know of the environment: more if it is made from a task."""
+        task = getattr(self.env.unwrapped, "task", None)
+        space = self.env.observation_space
+        discrete = isinstance(space, gymnasium.spaces.Discrete)
+        model = Model(
+            states=int(space.n) if discrete else 0,
+            observation_size=0 if discrete else int(np.prod(space.shape or (0,))),
+            actions=self._actions,
+            no_op=-1 if task is None else task.no_op,
+            discount=self.discount,
+            dynamics=task.dynamics() if task is not None and task.states else None,
+            distance=1 - np.eye(self._actions) if task is None else task.distance,
+        )
+        has = {
+            "states": discrete,
+            "dynamics": model.dynamics is not None,
+            "distance": task is not None and task.has_distance,
+            "undo": True,  # undo_of has looked
+            "no_op": model.no_op >= 0,
+        }
+        self.assistant.check_task(str(self.env.spec.id if self.env.spec else self.env), has)
+        return model
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -96,77 +119,106 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         if seed is not None:
             self._generator = np.random.Generator(np.random.SFC64([seed, *b"SharedControl"]))
             self._noise = []
-        self._recorded = _checked_noise(options.pop("noise", ()))
-        self._row = None
+        recorded = options.pop("noise", None)
+        self._recorded = None if recorded is None else _checked_noise(recorded)
+        self._session.values_now = None
         observation, info = self.env.reset(seed=seed, options=options or None)
-        row = check_width(self.values(observation), self._actions, "at reset")
-        self._start_value = float(row.max())
-        self.assistant.check_start(self._start_value)
-        self._row = row
-        self._earned, self._discount_now, self._total = 0.0, 1.0, 0.0
-        self._length, self._overrides = 0, 0
-        record = Step(-1, -1, -1, False, 0.0, 0.0, 0.0, row.copy(), self._start_value, 0.0)
-        return observation, {**info, RECORD: record._asdict()}
+        self._session.begin(observation)
+        self._observation, self._total, self._overrides = observation, 0.0, 0
+        account, row = self._session.account, self._session.values_now
+        state = self._session.state
+        first = Step(
+            account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, cast(Any, row),
+            account.start_value, 0.0, state, 0,
+        )  # fmt: skip
+        return observation, {**info, RECORD: first._asdict()}
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
 
         Raises:
             gymnasium.error.ResetNeeded: before `reset` or after an episode's end.
-            RequestError: for an action outside the action space, the person's or the rule's.
+            RequestError: for an action outside the action space, the caller's or the rule's, or if
+                the noise to be played again has run out.
         """
-        row = self._row
-        if row is None:
+        session, first = self._session, self._first_action
+        if session.values_now is None:
             raise gymnasium.error.ResetNeeded(
                 "call reset() before step(), and after an episode's end"
             )
-        first = self._first_action
         proposed = int(action) - first
         if not 0 <= proposed < self._actions:
             raise RequestError(
                 f"action = {action!r}; it must lie in [{first}, {first + self._actions})"
             )
-        if not self._noise:
-            self._noise = self._generator.random((_NOISE_DRAWN, 2)).tolist()
-        noise = Noise(*(self._recorded or self._noise).pop())
-        situation = Situation(row, proposed, self._earned, self._discount_now, self._start_value)
-        decision = self.assistant.decide(situation, noise, self._memory)
-        executed = int(decision.action)
-        if not 0 <= executed < self._actions:
-            raise RequestError(f"assistant {self.assistant.name} chose action {executed}")
-        observation, reward, terminated, truncated, info = self.env.step(executed + first)
+        decision = session.decide(proposed, self._next_noise())
+        before = self._undo[0]() if decision.undo and self._undo else None
+        observation, reward, terminated, truncated, info = self.env.step(decision.action + first)
         reward = float(reward)
-        credited = _perceive(self.perception, proposed, executed, reward, 0.0).action
-        record = Step(
-            proposed + first, executed + first, credited + first if credited >= 0 else -1,
-            executed != proposed, float(decision.probability), noise.coin, noise.tie, row.copy(),
-            _projected_return(self._earned, self._discount_now, float(row[proposed])), reward,
-        )  # fmt: skip
-        self._count(record, executed != proposed, reward)
-        info = {**info, RECORD: record._asdict()}
+        events = self._events(terminated, truncated, info)
+        if decision.undo:
+            self._take_back(before)
+            terminated, truncated = False, bool(events & LIMIT)
+        notice = self._notice(decision.action != proposed or decision.undo)
+        step = session.record(reward, observation, events, notice)
+        observation = self._observation if decision.undo else observation
+        self._observation = observation
+        self._total += reward
+        self._overrides += step.overridden
+        info = {**info, RECORD: self._shown(step)._asdict()}
         if terminated or truncated:
-            self._row = None
-            info[SUMMARY] = self._summary(record)
-        else:
-            self._row = check_width(
-                self.values(observation), self._actions, f"after step {self._length}"
-            )
+            info[SUMMARY] = self._summary(step)
         return observation, reward, terminated, truncated, info
 
-    def _count(self, record: Step, overridden: bool, reward: float) -> None:
-        self._memory = self.assistant.observe(self._memory, record)
-        self._earned += self._discount_now * reward
-        self._discount_now *= self.discount
-        self._total += reward
-        self._length += 1
-        self._overrides += overridden
+    def _next_noise(self) -> Noise:
+        if self._recorded is not None:
+            if not self._recorded:
+                raise RequestError(
+                    "noise: the pairs to be played again have run out before the episode ended"
+                )
+            return Noise(*self._recorded.pop())
+        if not self._noise:
+            self._noise = self._generator.random((_NOISE_DRAWN, 2)).tolist()
+        return Noise(*self._noise.pop())
+
+    def _notice(self, overridden: bool) -> float:
+        """A coin for a learner that notices some overrides, drawn only if it decides anything."""
+        undecided = overridden and 0 < self._session.perception.notices < 1
+        return float(self._generator.random()) if undecided else 0.0
+
+    def _events(self, terminated: bool, truncated: bool, info: dict[str, Any]) -> int:
+        """Bits of `qbumpers.tasks.dynamics` of a step."""
+        events = TERMINATED * bool(terminated)
+        if truncated:
+            events |= LIMIT if reached_limit(self.env) else TRUNCATED
+        return events | SUCCESS * bool(info.get("success")) | CRASH * bool(info.get("crash"))
+
+    def _take_back(self, before: Any) -> None:
+        if self._undo is None:
+            raise RequestError(
+                f"assistant {self.assistant.name} undoes a step; its rule must be registered with "
+                'needs=("undo",)'
+            )
+        self._undo[1](before)
+
+    def _shown(self, step: Step) -> Step:
+        """A record with actions as the environment numbers them."""
+        first = self._first_action
+        if not first:
+            return step
+        return step._replace(
+            proposed=step.proposed + first,
+            executed=step.executed + first,
+            credited=step.credited + first if step.credited >= 0 else -1,
+        )
 
     def _summary(self, last: Step) -> dict[str, Any]:
+        account = self._session.account
         return {
             "return": self._total,
-            "length": self._length,
+            "length": account.step,
             "overrides": self._overrides,
-            "start_value": self._start_value,
+            "start_value": account.start_value,
             "projected_return": last.projected_return,
         }
 

@@ -13,11 +13,16 @@ from qbumpers.errors import unknown_name
 @application.command("list")
 def list_names(
     what: Annotated[
-        str, typer.Argument(help="What to list.", metavar="assistants|tasks|learners")
+        str, typer.Argument(help="What to list.", metavar="assistants|tasks|learners|perceptions")
     ] = "assistants",
 ) -> None:
     """List what experiments can name."""
-    listings = {"assistants": _list_assistants, "tasks": _list_tasks, "learners": _list_learners}
+    listings = {
+        "assistants": _list_assistants,
+        "tasks": _list_tasks,
+        "learners": _list_learners,
+        "perceptions": _list_perceptions,
+    }
     if what not in listings:
         raise unknown_name("list", what, listings)
     OUTPUT.print(listings[what]())
@@ -49,21 +54,36 @@ def _list_tasks() -> Table:
 
 
 def _list_learners() -> Table:
-    from qbumpers.experiments.learner_designs import LEARNERS
+    from qbumpers.learners import learners
+
+    listing = table("learner", "settings (with defaults)", "learns from", "what it does")
+    for name, learner in learners().items():
+        defaults: dict[str, Any] = learner.settings_type._field_defaults  # type: ignore[attr-defined]
+        settings = [f"{field} = {_short(value)}" for field, value in defaults.items()]
+        observed = "numbered states" if learner.observes == "states" else "vectors"
+        listing.add_row(name, ", ".join(settings), observed, _first_line(learner.settings_type))
+    listing.caption = "What they believe about overrides: qbumpers list perceptions."
+    return listing
+
+
+def _list_perceptions() -> Table:
     from qbumpers.learners import PERCEPTIONS
 
-    listing = table("learner", "perception", "credits when overridden", "penalised")
-    for learner in LEARNERS:
-        for name, perception in PERCEPTIONS.items():
-            credited = "its own action" if perception.credits_proposed else "the executed action"
-            if not perception.learns_when_overridden:
-                credited = "nothing"
-            listing.add_row(learner, name, credited, "yes" if perception.penalised else "no")
+    listing = table("perception", "notices overrides", "credits if it notices", "penalty")
+    for name, perception in PERCEPTIONS.items():
+        row = (f"{perception.notices:.0%}", perception.credits, f"{perception.penalty:g}")
+        listing.add_row(name, *row)
     listing.caption = (
-        "Tasks with a transition table are learned by q-learning, tasks observed as vectors by "
-        "double-dqn."
+        "An override that is not noticed is taken for one's own doing: the proposed action is "
+        "credited."
     )
     return listing
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, tuple):
+        return "(" + ", ".join(map(_short, value)) + ")"
+    return str(value).lower()
 
 
 def _first_line(function: Any) -> str:

@@ -5,21 +5,23 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
-from pydantic import ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializeAsAny,
+    ValidationError,
+    model_validator,
+)
 
-from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.assistants import Assistant, assistants, make_assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
-from qbumpers.experiments.learner_designs import (
-    LearnerDesign,
-    Model,
-    apart,
-    suitable_learner,
-    written,
-)
-from qbumpers.learners import PERCEPTIONS
+from qbumpers.experiments.learner_designs import LearnerDesign, apart, by_name, written
+from qbumpers.experiments.models import Model
+from qbumpers.learners import learners
 from qbumpers.tasks import Task, make_task
 
 
@@ -58,8 +60,33 @@ class AssistantDesign(Model):
 
     def assistants(self) -> list[Assistant]:
         """One assistant for each combination of listed options, the last option fastest."""
-        combinations = swept(self.model_extra or {}, f"assistant {self.name}")
+        listed = _options_listed(self.name, self.model_extra or {})
+        combinations = swept(listed, f"assistant {self.name}")
         return [make_assistant(self.name, **options) for options in combinations]
+
+    def count(self) -> int:
+        """How many assistants there are, counted without making them."""
+        return combinations(_options_listed(self.name, self.model_extra or {}))
+
+
+def _options_listed(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options with a list if, and only if, they are to be swept over.
+
+    A list is a value of an option that is a tuple, and a list of such lists is swept over; the
+    options of another assistant (`of`) are swept over inside their own table.
+    """
+    rules = assistants()
+    hints = get_type_hints(rules[name].options_type) if name in rules else {}
+    listed = dict(options)
+    for option, value in options.items():
+        is_tuple = getattr(hints.get(option), "__origin__", None) is tuple
+        if is_tuple and isinstance(value, list) and not any(isinstance(v, list) for v in value):
+            listed[option] = [value]
+        elif option == "of" and isinstance(value, dict) and isinstance(value.get("name"), str):
+            inner = {field: each for field, each in value.items() if field != "name"}
+            tables = swept(_options_listed(value["name"], inner), f"assistant {value['name']}")
+            listed[option] = [{"name": value["name"], **table} for table in tables]
+    return listed
 
 
 class NamedCondition(NamedTuple):
@@ -69,7 +96,7 @@ class NamedCondition(NamedTuple):
         condition: its readable id, for instance "stochastic-q-bumpers/alpha=0.7"; with
             "@perception=observant" at its end where the experiment has several learners.
         assistant: the assistant.
-        learner: the simulated person.
+        learner: the simulated learner.
         learner_id: the learner's readable id, for instance "q-learning".
     """
 
@@ -80,7 +107,7 @@ class NamedCondition(NamedTuple):
 
 
 class Experiment(Model):
-    """An experiment: one task, the assistants to compare, and the people who learn with them.
+    """An experiment: one task, the assistants to compare, and the learners who learn with them.
 
     Attributes:
         name: of the experiment, and of its default output folder.
@@ -89,8 +116,8 @@ class Experiment(Model):
         values: Q* of the assistants: "exact" or "q-learning" for a task with a table, "expert" for
             the expert that ships for a task, or the path of a values file. Where left out, exact
             for a task with a table, else the expert's.
-        learners: the simulated people; every assistant meets each of them. Where left out, the
-            paper's, who learn in the way that suits the task.
+        learners: the simulated learners; every assistant meets each of them. If left out, the
+            paper's, of the kind that suits the task.
         assistants: what to compare; one for each combination of listed options.
         trials: people a condition.
         episodes: assisted episodes a trial, each followed by a greedy one without help.
@@ -105,7 +132,10 @@ class Experiment(Model):
     reproduces: str | None = None
     task: TaskDesign
     values: str
-    learners: Annotated[list[LearnerDesign], Field(min_length=1)]
+    learners: Annotated[
+        list[Annotated[SerializeAsAny[LearnerDesign], BeforeValidator(by_name)]],
+        Field(min_length=1),
+    ]
     assistants: Annotated[list[AssistantDesign], Field(min_length=1)]
     trials: Annotated[int, Field(ge=1)] = 100
     episodes: Annotated[int, Field(ge=1)] = 100
@@ -123,22 +153,21 @@ class Experiment(Model):
         settings = {"learners": [{}], **settings}
         if isinstance(settings.get("task"), str):
             settings["task"] = {"name": settings["task"]}
-        learners = settings["learners"]
-        if isinstance(learners, list):
-            settings["learners"] = _all_learners(learners, settings.get("task"))
+        if isinstance(settings["learners"], list):
+            settings["learners"] = _all_learners(settings["learners"], settings.get("task"))
             names = [one.get("name") for one in settings["learners"] if isinstance(one, dict)]
-            settings.setdefault("values", "expert" if "double-dqn" in names else "exact")
+            deep = any(learner_observes(name) == "vectors" for name in names)
+            settings.setdefault("values", "expert" if deep else "exact")
         return settings
 
     @model_validator(mode="after")
     def _known_names(self) -> "Experiment":
         for learner in self.learners:
-            if learner.perception not in PERCEPTIONS:
-                raise unknown_name("learners.perception", learner.perception, PERCEPTIONS)
-            if learner.name != self.learners[0].name:
+            if learner.observes != self.learners[0].observes:
                 raise RequestError(
-                    f"learners.name = {learner.name!r}; people of one experiment learn in the same "
-                    f"way, and the first ones by {self.learners[0].name!r}"
+                    f"learners.name = {learner.name!r}; it observes {learner.observes}, and "
+                    f"{self.learners[0].name!r}, the first one, {self.learners[0].observes}: the "
+                    "learners of one experiment observe alike"
                 )
         if self.reproduces is not None and self.reproduces not in reproductions():
             raise unknown_name("reproduces", self.reproduces, reproductions())
@@ -146,8 +175,8 @@ class Experiment(Model):
 
     @property
     def tabular(self) -> bool:
-        """Whether its people learn a table, by the number of the state."""
-        return self.learners[0].name == "q-learning"
+        """Whether its learners learn from numbered states."""
+        return self.learners[0].observes == "states"
 
     def trials_a_cell(self) -> int:
         """How many trials a whole cell has: a deep learner's trial is long enough by itself."""
@@ -155,8 +184,7 @@ class Experiment(Model):
 
     def condition_count(self) -> int:
         """How many conditions there are, counted without making them."""
-        options = [assistant.model_extra or {} for assistant in self.assistants]
-        return len(self.learners) * sum(map(combinations, options))
+        return len(self.learners) * sum(assistant.count() for assistant in self.assistants)
 
     def conditions(self) -> list[NamedCondition]:
         """The conditions, learner by learner, in the order of the file.
@@ -164,14 +192,16 @@ class Experiment(Model):
         Raises:
             RequestError: where an assistant or option is wrong, or a condition occurs twice.
         """
-        assistants = [a for design in self.assistants for a in design.assistants()]
-        names = [condition_id(assistant, assistants) for assistant in assistants]
+        made = [a for design in self.assistants for a in design.assistants()]
+        names = [condition_id(assistant, made) for assistant in made]
         everyone = []
         for learner in self.learners:
-            addition, learner_id = (apart(learner, self.learners, mark) for mark in "@/")
+            addition = apart(learner, self.learners, "@")
+            alike = [other for other in self.learners if other.name == learner.name]
+            learner_id = learner.name + apart(learner, alike, "/")
             everyone += [
-                NamedCondition(name + addition, assistant, learner, learner.name + learner_id)
-                for name, assistant in zip(names, assistants, strict=True)
+                NamedCondition(name + addition, assistant, learner, learner_id)
+                for name, assistant in zip(names, made, strict=True)
             ]
         for name, times in Counter(named.condition for named in everyone).items():
             if times > 1:
@@ -179,26 +209,31 @@ class Experiment(Model):
         return everyone
 
 
-def _all_learners(learners: list[Any], task: Any) -> list[Any]:
+def _all_learners(given: list[Any], task: Any) -> list[Any]:
     """Learners by name, with listed fields swept over."""
-    tables = [each for each in learners if isinstance(each, dict)]
+    tables = [each for each in given if isinstance(each, dict)]
     many = sum(map(combinations, tables))
     if many > MANY_CELLS:
         raise RequestError(f"learners: {many:,} of them; at most {MANY_CELLS:,} are taken")
     if not all("name" in each for each in tables):
         name = _learner_name(task)
-        learners = [{"name": name, **each} if isinstance(each, dict) else each for each in learners]
+        given = [{"name": name, **each} if isinstance(each, dict) else each for each in given]
     return [
         each
-        for learner in learners
+        for learner in given
         for each in (swept(learner, "learner") if isinstance(learner, dict) else [learner])
     ]
+
+
+def learner_observes(name: Any) -> str:
+    """What a kind of learner observes; "states" if there is none of the name."""
+    return learners()[name].observes if name in learners() else "states"
 
 
 def _learner_name(task: Any) -> str:
     """Name of the way in which people can learn a task, given as plain data."""
     try:
-        return suitable_learner(TaskDesign.model_validate(task).task())
+        return TaskDesign.model_validate(task).task().learners[0]
     except (ValidationError, RequestError):
         return "q-learning"  # what is wrong with the task is told where the task is needed
 

@@ -1,161 +1,123 @@
-"""Simulated people of an experiment, as data: one model for each way of learning."""
+"""Simulated learners of an experiment, as data: one model per registered kind of learner."""
 
+import functools
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field, create_model
 
-from qbumpers.learners import DoubleDQN, QLearner, Schedule
-from qbumpers.networks import Network
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.assistants import Assistant
+from qbumpers.errors import unknown_name
+from qbumpers.experiments.models import Model, model_fields_of, model_of, settings_of
+from qbumpers.learners import PERCEPTIONS, Motor, Perception, learner_type, learners
 
-Discount = Annotated[float, Field(gt=0, le=1)]
-Count = Annotated[int, Field(ge=1)]
-Units = Annotated[int, Field(ge=1, le=4096)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class Model(BaseModel):
-    """Data whose fields are all known, of exactly their kind, and never change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+_PerceptionDesign: Any = model_of(Perception)
+_MotorDesign: Any = model_of(Motor)
 
 
-class ScheduleDesign(Model):
-    """A number that changes linearly over the first `fraction` of the episodes, then stays."""
-
-    start: Annotated[float, Field(ge=0, le=1)] = 1.0
-    end: Annotated[float, Field(ge=0, le=1)] = 0.02
-    fraction: Annotated[float, Field(ge=0, le=1)] = 0.9
-
-    def schedule(self) -> Schedule:
-        """The schedule of this design."""
-        return Schedule(self.start, self.end, self.fraction)
+def _known_perception(given: Any) -> Any:
+    if isinstance(given, str) and given not in PERCEPTIONS:
+        raise unknown_name("learners.perception", given, PERCEPTIONS)
+    return given if isinstance(given, str) else _PerceptionDesign.model_validate(given)
 
 
-class QLearnerDesign(Model):
-    """A person who learns a table. In a file, a field given as a list is swept over.
+class LearnerDesign(Model):
+    """A simulated learner. In a file, a field given as a list is swept over.
+
+    The settings of its kind are fields too, for instance `epsilon` of "q-learning"; `discount` is
+    the task's if it is left out.
 
     Attributes:
-        name: "q-learning".
-        perception: what they believe happened when they were overridden.
-        discount: of their values; the task's where left out.
-        epsilon: schedule of exploration.
-        learning_rate: schedule of the step size.
-        initial_value: of every action, in reward units.
-        penalty: what an override feels like to a learner who perceives disruption, in reward units.
+        name: a registered kind of learner.
+        perception: what it believes happened when it was overridden, the name of a perception or a
+            table with `notices`, `credits` and `penalty`.
+        penalty: what an override feels like under a named perception that includes disruption, in
+            reward units.
+        motor: how its hand errs, a table with `slip` and `lag`.
+        forgetting: share of what it learned that a learner of a table forgets between episodes.
     """
 
-    name: Literal["q-learning"] = "q-learning"
-    perception: str = "transition"
-    discount: Discount | None = None
-    epsilon: ScheduleDesign = ScheduleDesign()
-    learning_rate: ScheduleDesign = ScheduleDesign()
-    initial_value: Finite = 0.0
-    penalty: Finite = 1.0
+    name: str
+    perception: Annotated[Any, BeforeValidator(_known_perception)] = "transition"
+    penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
+    motor: _MotorDesign | None = None
+    forgetting: Annotated[float, Field(ge=0, le=1)] = 0.0
 
-    def learner(self, task_discount: float) -> QLearner:
-        """The learner of this design, at a task of that discount."""
-        return QLearner(
-            discount=task_discount if self.discount is None else self.discount,
-            epsilon=self.epsilon.schedule(),
-            learning_rate=self.learning_rate.schedule(),
-            initial_value=self.initial_value,
-            penalty=self.penalty,
-        )
+    def setup(self, task_discount: float) -> dict[str, Any]:
+        """What `make_condition` needs to know of the learner, at a task of that discount."""
+        motor = self.motor.model_dump() if self.motor else {}
+        perception = self.perception
+        if not isinstance(perception, str):
+            perception = Perception(**perception.model_dump())
+        return {
+            "learner": self.learner(task_discount),
+            "perception": perception,
+            "penalty": self.penalty,
+            "motor": Motor(**motor),
+            "forgetting": self.forgetting,
+        }
+
+    def learner(self, task_discount: float) -> Any:
+        """The settings of its kind, at a task of that discount."""
+        kind = learner_type(self.name).settings_type
+        fields = self.model_dump(exclude=set(LearnerDesign.model_fields))
+        if fields.get("discount", 0) is None:
+            fields["discount"] = task_discount
+        return settings_of(kind, fields)
+
+    def described(self) -> dict[str, Any]:
+        """Every field in the order in which ids tell them."""
+        fields = self.model_dump()
+        last = {name: fields.pop(name) for name in ("penalty", "motor", "forgetting")}
+        return {**fields, **last}
+
+    @property
+    def observes(self) -> str:
+        """Whether it learns from "states" by number or from "vectors"."""
+        return learner_type(self.name).observes
 
 
-class NetworkDesign(Model):
-    """The shape of a network.
+@functools.cache
+def _design_of(kind: type, name: str) -> type[LearnerDesign]:
+    fields = model_fields_of(kind)
+    if "discount" in fields:
+        fields["discount"] = (fields["discount"][0] | None, None)
+    fields["name"] = (Literal[name], name)
+    return create_model(f"{kind.__name__}Design", __base__=LearnerDesign, **fields)
 
-    Attributes:
-        hidden: units of each hidden layer.
-        activation: of hidden units.
-        dueling: units of each of the two streams of a dueling network; 0 for a plain one.
+
+def design_class(name: str) -> type[LearnerDesign]:
+    """The model of a registered kind of learner.
+
+    Raises:
+        RequestError: if there is none of that name.
     """
-
-    hidden: list[Units] = [64, 64]
-    activation: Literal["tanh", "relu"] = "tanh"
-    dueling: Annotated[int, Field(ge=0, le=4096)] = 0
-
-
-class DoubleDQNDesign(Model):
-    """A person who learns a network. In a file, a field given as a list is swept over.
-
-    Attributes:
-        name: "double-dqn".
-        perception: what they believe happened when they were overridden.
-        discount: of their values; the task's where left out.
-        network: its shape.
-        epsilon: schedule of exploration.
-        learning_rate: of Adam.
-        batch_size: transitions of an update.
-        replay_size: transitions that are remembered.
-        learning_starts: steps before the first update; from then on there is one a step.
-        target_every: steps after which the target network is renewed.
-        clip: which norm of the gradient is clipped: of all parameters, of each variable, or none.
-        gradient_limit: of that norm.
-        penalty: what an override feels like to a learner who perceives disruption, in reward units.
-    """
-
-    name: Literal["double-dqn"] = "double-dqn"
-    perception: str = "transition"
-    discount: Discount | None = None
-    network: NetworkDesign = NetworkDesign()
-    epsilon: ScheduleDesign = ScheduleDesign(fraction=0.1)
-    learning_rate: Annotated[float, Field(gt=0, le=1)] = 1e-3
-    batch_size: Count = 32
-    replay_size: Count = 50_000
-    learning_starts: Count = 1_000
-    target_every: Count = 1_500
-    clip: Literal["global", "variable", "none"] = "global"
-    gradient_limit: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 10.0
-    penalty: Finite = 1.0
-
-    def learner(self, task_discount: float) -> DoubleDQN:
-        """The learner of this design, at a task of that discount."""
-        settings = self.model_dump(exclude={"name", "perception"})
-        shape = self.network
-        return DoubleDQN(
-            **settings
-            | {
-                "discount": task_discount if self.discount is None else self.discount,
-                "network": Network(tuple(shape.hidden), shape.activation, shape.dueling),
-                "epsilon": self.epsilon.schedule(),
-            }
-        )
+    if name not in learners():
+        raise unknown_name("learners.name", name, learners())
+    return _design_of(learner_type(name).settings_type, name)
 
 
-LEARNERS = {"q-learning": QLearnerDesign, "double-dqn": DoubleDQNDesign}
-"""Ways of learning by name."""
-
-
-class _Named(BaseModel):
-    model_config = ConfigDict(strict=True)
-
-    name: Literal["q-learning", "double-dqn"] = "q-learning"
-
-
-def _by_name(settings: Any) -> Any:
+def by_name(settings: Any) -> Any:
     """A learner by its name, so that messages are about fields of its own kind alone."""
-    if isinstance(settings, QLearnerDesign | DoubleDQNDesign):
+    if isinstance(settings, LearnerDesign):
         return settings
     if not isinstance(settings, dict):
-        return QLearnerDesign.model_validate(settings)
-    return LEARNERS[_Named.model_validate(settings).name].model_validate(settings)
+        return LearnerDesign.model_validate(settings)
+    return design_class(settings.get("name", "q-learning")).model_validate(settings)
 
 
-LearnerDesign = Annotated[QLearnerDesign | DoubleDQNDesign, BeforeValidator(_by_name)]
-"""A simulated person, of the kind that its `name` says."""
-
-
-def suitable_learner(task: Task) -> str:
-    """Name of the way in which people can learn a task."""
-    return "q-learning" if isinstance(task, TabularTask) else "double-dqn"
+def field_names() -> list[str]:
+    """Every field that some kind of learner has, to suggest one for an unknown field."""
+    names = {field for name in learners() for field in design_class(name).model_fields}
+    for name in learners():
+        kind = learner_type(name).settings_type
+        for default in kind._field_defaults.values():  # type: ignore[attr-defined]
+            names |= set(getattr(default, "_fields", ()))
+    return sorted(names | {*Motor._fields, *Perception._fields})
 
 
 def apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> str:
-    """What tells a learner from others of its kind, after a mark; nothing where it is alone.
+    """What tells a learner from the others, after a mark; nothing if it is alone.
 
     Args:
         learner: one of them.
@@ -167,22 +129,32 @@ def apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> 
     """
     if len(among) == 1:
         return ""
-    fields = learner.model_dump()
-    others = [other.model_dump() for other in among]
+    fields = learner.described()
+    others = [other.described() for other in among]
     shown = [
         f"{field}={written(value)}"
         for field, value in fields.items()
-        if any(other[field] != value for other in others)
+        if any(field in other and other[field] != value for other in others)
     ]
     return mark + ",".join(shown)
 
 
 def written(value: Any) -> str:
     """A value as ids have it: short and exact."""
-    if isinstance(value, dict):  # a schedule or a network
+    if isinstance(value, Assistant):
+        return _inline_table(value)
+    if isinstance(value, dict):  # settings within settings
         return "..".join(written(part) for part in value.values())
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return "-".join(written(part) for part in value)
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
+
+
+def _inline_table(assistant: Assistant) -> str:
+    """An assistant that another one is over, as a file has it; defaults are left out."""
+    defaults: dict[str, Any] = assistant.rule.options_type._field_defaults  # type: ignore[attr-defined]
+    shown = {f: v for f, v in assistant.options._asdict().items() if defaults.get(f) != v}
+    parts = [f'"{assistant.name}"', *(f"{f}={written(v)}" for f, v in shown.items())]
+    return "{name=" + ",".join(parts) + "}"

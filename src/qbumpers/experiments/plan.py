@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
-from qbumpers.experiments.learner_designs import suitable_learner
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
@@ -62,10 +61,10 @@ def make_plan(experiment: Experiment) -> Plan:
     """
     task = experiment.task.task()
     for learner in experiment.learners:
-        if learner.name != suitable_learner(task):
+        if (learner.observes == "states") != (task.states > 0):
             raise RequestError(
-                f"learners.name = {learner.name!r}; at task {task.name} people learn by "
-                f"{suitable_learner(task)!r}"
+                f"learners.name = {learner.name!r}; it observes {learner.observes}, and task "
+                f"{task.name} is learned by {' or '.join(map(repr, task.learners))}"
             )
     values = _values(experiment.values, task)
     named, conditions = [], {}
@@ -74,8 +73,7 @@ def make_plan(experiment: Experiment) -> Plan:
             task,
             each.assistant,
             values=values,
-            learner=each.learner.learner(task.discount),
-            perception=each.learner.perception,
+            **each.learner.setup(task.discount),
             episodes=experiment.episodes,
             retention=experiment.retention,
             common_random_numbers=experiment.common_random_numbers,
@@ -124,7 +122,8 @@ def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     for cell in cells:
         condition = plan.conditions[cell.content]
         tabular = isinstance(condition.task, TabularTask)
-        alike = condition.assistant.name if tabular else condition.learner
+        alike = (condition.assistant.name, condition.learner_type.name)
+        alike = alike if tabular else condition.learner
         if alike not in seconds:
             measure = _seconds_a_trial if tabular else _seconds_a_deep_trial
             seconds[alike] = measure(condition, plan.experiment.seed)
@@ -146,13 +145,18 @@ def _seconds_a_trial(condition: Condition, seed: int) -> float:
         trials *= 4
 
 
+def _learning_at_once(learner: Any) -> Any:
+    """A learner that learns from its first step on, if that is a setting of its kind."""
+    return learner._replace(learning_starts=1) if "learning_starts" in learner._fields else learner
+
+
 def _seconds_a_deep_trial(condition: Condition, seed: int) -> float:
     """From a few short episodes of a learner that learns from its first step on."""
     task: Any = condition.task
     learner: Any = condition.learner
     short = condition._replace(
         task=dataclasses.replace(task, episode_limit=min(task.episode_limit, _SHORT)),
-        learner=learner._replace(learning_starts=1),
+        learner=_learning_at_once(learner),
         retention=0,
     )
     run_condition(short._replace(episodes=1), trials=1, seed=seed)

@@ -10,10 +10,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
-from qbumpers.simulation import Steps, record
+from qbumpers.simulation import record
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.tasks.dynamics import TERMINATED
 
@@ -102,11 +103,11 @@ def _observation_space(task: Task) -> gymnasium.Space[Any]:
     return gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
 
 
-def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
+def _episodes(trial: int, steps: Step) -> Iterator[dict[str, Any]]:
     """The fields of Minari's buffers, an episode each."""
     ends = [*(np.flatnonzero(np.diff(steps.episode)) + 1), len(steps.episode)]
     for first, end in itertools.pairwise([0, *ends]):
-        part = Steps(*(array[first:end] for array in steps))
+        part = Step(*(array[first:end] for array in steps))
         terminated = (part.events & TERMINATED) > 0
         truncated = np.zeros(end - first, bool)
         truncated[-1] = not terminated[-1]

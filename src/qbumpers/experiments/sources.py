@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from qbumpers.errors import RequestError, from_validation, unknown_name
 from qbumpers.experiments.cells import MANY_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign, reproductions
-from qbumpers.experiments.learner_designs import LEARNERS, NetworkDesign, ScheduleDesign
+from qbumpers.experiments.learner_designs import field_names
 
 
 def make_experiment(
@@ -51,8 +51,8 @@ def make_experiment(
 
 
 def _field_names() -> list[str]:
-    models = (Experiment, TaskDesign, *LEARNERS.values(), NetworkDesign, ScheduleDesign)
-    return sorted({field for model in models for field in model.model_fields})
+    models = (Experiment, TaskDesign)
+    return sorted({*field_names(), *(field for model in models for field in model.model_fields)})
 
 
 def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:

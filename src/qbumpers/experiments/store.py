@@ -15,6 +15,7 @@ import polars as pl
 import tomli_w
 
 import qbumpers
+from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
@@ -182,13 +183,23 @@ def _labels(named: NamedCondition, kind: str) -> list[pl.Expr]:
     """Columns that say whose rows these are."""
     labels = [pl.lit(named.condition).alias("condition")]
     if kind == EPISODES:
-        alpha = named.assistant.options._asdict().get("alpha")
+        alpha = _alpha_of(named.assistant)
         labels += [
             pl.lit(named.assistant.name).alias("assistant"),
             pl.lit(alpha, pl.Float64).alias("alpha"),
             pl.lit(named.learner_id).alias("learner"),
         ]
     return labels
+
+
+def _alpha_of(assistant: Assistant | None) -> float | None:
+    """The option alpha of an assistant or of one that it is over."""
+    while assistant is not None:
+        options = assistant.options._asdict()
+        if "alpha" in options:
+            return options["alpha"]
+        assistant = assistant.of
+    return None
 
 
 def _digest(content: bytes) -> str:

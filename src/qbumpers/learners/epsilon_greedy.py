@@ -1,4 +1,4 @@
-"""Epsilon-greedy choice among action values (Sutton and Barto 2018, Section 2.2), and its policy."""
+"""Epsilon-greedy choice among action values (Sutton and Barto 2018, Section 2.2)."""
 
 import numpy as np
 

@@ -1,5 +1,6 @@
-"""SARSA (Rummery and Niranjan 1994; Sutton and Barto 2018, Section 6.4): learns from its own next
-action, so that its values contain its exploration.
+"""SARSA (Rummery and Niranjan 1994; Sutton and Barto 2018, Section 6.4).
+
+It learns from its own next action, so that its values contain its exploration.
 """
 
 from typing import Annotated, NamedTuple

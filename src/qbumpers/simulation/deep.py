@@ -283,10 +283,12 @@ def _assistance(condition: Condition) -> NetworkAssistance:
     values, others = condition.values, condition.others
     actions = condition.task.actions
     further = [network.parameters for network in others]
+    further_parameters = np.stack(further) if further else np.zeros((0, 1), np.float32)
+    further_parameters.flags.writeable = False  # of the same type as those of Q*
     return NetworkAssistance(
         layout=values.layout,
         parameters=values.parameters,
-        others=np.stack(further) if further else np.zeros((0, 1), np.float32),
+        others=further_parameters,
         workspace=np.zeros(values.layout.room(1), np.float32),
         row=np.zeros(actions),
         other_rows=np.zeros((len(others), actions)),

@@ -57,9 +57,17 @@ class TabularTask:
         """Check every field."""
         _check(self)
 
-    observation_size=0; no_op=-1; has_distance=False; undoable=True; seen=None; learners=("q-learning","sarsa","expected-sarsa")
+    observation_size = 0
+    no_op = -1
+    has_distance = False
+    undoable = True
+    seen = None
+    learners = ("q-learning", "sarsa", "expected-sarsa")
+
     @property
-    def distance(self): return 1-np.eye(self.actions)
+    def distance(self):
+        return 1 - np.eye(self.actions)
+
     @property
     def states(self) -> int:
         """S."""

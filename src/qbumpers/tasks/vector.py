@@ -99,9 +99,17 @@ class VectorTask:
                 "and lists and tables of them can be kept with results"
             ) from error
 
-    states=0; no_op=-1; has_distance=False; undoable=False; seen=None; learners=("double-dqn",)
+    states = 0
+    no_op = -1
+    has_distance = False
+    undoable = False
+    seen = None
+    learners = ("double-dqn",)
+
     @property
-    def distance(self): return 1-np.eye(self.actions)
+    def distance(self):
+        return 1 - np.eye(self.actions)
+
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         content = {
