@@ -2,8 +2,9 @@
 
 from qbumpers.tasks.cliff_walking import CliffWalking, cliff_walking
 from qbumpers.tasks.environment import TabularEnvironment
-from qbumpers.tasks.registry import Task, make_task, register_task, task_names
+from qbumpers.tasks.registry import make_task, register_task, task_names
 from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.task import Task
 from qbumpers.tasks.vector import Stepper, VectorTask
 
 __all__ = [

@@ -53,6 +53,9 @@ _SHAPING = 8  # place in the state, after the observation
 _STATE_SIZE = 10
 _NOTHING, _LEFT, _MAIN, _RIGHT = range(ACTIONS)
 
+_ENGINES = np.eye(ACTIONS)[:, 1:]  # [action, engine], whether it burns
+_ENGINES_THAT_DIFFER = np.abs(_ENGINES[:, None] - _ENGINES).sum(axis=2)
+
 
 def chance_of(seed: int | None) -> np.random.Generator:
     """What terrain, force and noise of an episode are drawn from.
@@ -176,6 +179,8 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         settings={"seed": seed},
         has_success=True,
         has_crash=True,
+        no_op=_NOTHING,
+        action_distance=_ENGINES_THAT_DIFFER,
     )
 
 
