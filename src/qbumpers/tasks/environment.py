@@ -62,3 +62,15 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         events = int(dynamics.events[index])
         info = {"success": bool(events & SUCCESS), "crash": bool(events & CRASH)}
         return self._state, float(dynamics.reward[index]), bool(events & TERMINATED), False, info
+
+    def snapshot(self) -> int:
+        """The number of the state."""
+        return self._state
+
+    def restore(self, snapshot: int) -> None:
+        """Put a state back; chance goes on, so that the same action may lead elsewhere.
+
+        Args:
+            snapshot: from `snapshot`.
+        """
+        self._state = snapshot

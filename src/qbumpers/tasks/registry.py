@@ -10,9 +10,10 @@ from gymnasium import spaces
 
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.tasks.cliff_walking import cliff_walking
+from qbumpers.tasks.stepping import make_environment
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task
-from qbumpers.tasks.vector import VectorTask, make_environment
+from qbumpers.tasks.vector import VectorTask
 
 
 def _lunar_lander(seed: int | None = None) -> VectorTask:

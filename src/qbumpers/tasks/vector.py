@@ -1,10 +1,10 @@
-"""Tasks whose observations are vectors, stepped through one action at a time."""
+"""Tasks whose observations are vectors."""
 
 import functools
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,37 +13,10 @@ from gymnasium import spaces
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
 from qbumpers.tasks.checking import check_common
-from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED, Dynamics
+from qbumpers.tasks.dynamics import Dynamics
+from qbumpers.tasks.stepping import GymnasiumStepper, Stepper, make_environment
 from qbumpers.tasks.task import distance_between
-
-_SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
-
-
-class Stepper(Protocol):
-    """An environment as a simulator steps through it; the simulator keeps the step limit."""
-
-    def reset(self, chance: float) -> np.ndarray:
-        """Start an episode.
-
-        Args:
-            chance: in [0, 1), decides everything about the episode that is left to chance.
-
-        Returns:
-            The first observation, a new array, float32 [D].
-        """
-        ...
-
-    def step(self, action: int) -> tuple[np.ndarray, float, int]:
-        """Take an action.
-
-        Args:
-            action: in [0, A).
-
-        Returns:
-            The observation, a new array, float32 [D]; the reward; the events, bits TERMINATED,
-            SUCCESS, CRASH and TRUNCATED of `qbumpers.tasks.dynamics`.
-        """
-        ...
+from qbumpers.tasks.undoing import can_undo
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +146,8 @@ class VectorTask:
         """A task from a Gymnasium environment with numbered actions and a vector observation.
 
         Every episode is seeded by itself. Successes and crashes are known if `info` has the keys
-        `success` and `crash` at reset or after the first step.
+        `success` and `crash` at reset or after the first step. Steps can be undone if `undo_of`
+        says so of the environment.
 
         Args:
             name: id of the environment, for example "CartPole-v1".
@@ -190,7 +164,7 @@ class VectorTask:
         """
         with closing(make_environment(name, **arguments)) as environment:
             _check_spaces(name, environment)
-            announced = _announced(environment)
+            announced, undoable = _announced(environment), can_undo(environment)
             limit = episode_limit
             if limit is None and environment.spec:
                 limit = environment.spec.max_episode_steps
@@ -209,27 +183,8 @@ class VectorTask:
             settings={"environment": name, "arguments": arguments},
             has_success="success" in announced,
             has_crash="crash" in announced,
+            undoable=undoable,
         )
-
-
-def make_environment(name: str, **arguments: Any) -> Any:
-    """A Gymnasium environment.
-
-    Args:
-        name: its id.
-        **arguments: of `gymnasium.make`.
-
-    Returns:
-        The environment.
-
-    Raises:
-        RequestError: if there is none of this name or an argument does not suit it.
-    """
-    try:
-        return gymnasium.make(name, disable_env_checker=True, **arguments)
-    except (TypeError, ValueError, LookupError, gymnasium.error.Error, ImportError) as error:
-        missing = "; pip install 'qbumpers[lunar]'" if "Box2D" in str(error) else ""
-        raise RequestError(f"task {name!r}: {error}{missing}") from error
 
 
 def _check_spaces(name: str, environment: Any) -> None:
@@ -251,30 +206,3 @@ def _announced(environment: Any) -> set[str]:
     _, first = environment.reset(seed=0)
     *_, info = environment.step(environment.action_space.start)
     return {*first, *info}
-
-
-class GymnasiumStepper:
-    """Any Gymnasium environment with numbered actions and a vector observation, for simulators.
-
-    Args:
-        name: id of the environment.
-        arguments: of the environment.
-    """
-
-    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
-        self._environment = make_environment(name, max_episode_steps=-1, **arguments)
-        self._first_action = int(self._environment.action_space.start)
-
-    def reset(self, chance: float) -> np.ndarray:
-        """As `Stepper.reset`; the chance becomes the seed of the episode."""
-        observation, _ = self._environment.reset(seed=int(chance * _SEEDS))
-        return np.array(observation, np.float32)
-
-    def step(self, action: int) -> tuple[np.ndarray, float, int]:
-        """As `Stepper.step`."""
-        observation, reward, terminated, truncated, info = self._environment.step(
-            self._first_action + action
-        )
-        events = TERMINATED * bool(terminated) | TRUNCATED * bool(truncated)
-        events |= SUCCESS * bool(info.get("success")) | CRASH * bool(info.get("crash"))
-        return np.array(observation, np.float32), float(reward), events
