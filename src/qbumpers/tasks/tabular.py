@@ -261,7 +261,7 @@ class TabularTask:
         """A task from a Gymnasium environment that has a transition table `P`.
 
         Args:
-            environment: for instance `gymnasium.make("FrozenLake-v1")`.
+            environment: for example `gymnasium.make("FrozenLake-v1")`.
             discount: in (0, 1]; Gymnasium's environments state none.
             episode_limit: steps; the environment's own limit if None.
             success: as for `from_table`.
