@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from qbumpers.errors import RequestError
@@ -11,7 +11,7 @@ from qbumpers.experiments.design import Experiment, NamedCondition
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task
 from qbumpers.values import (
     NetworkValues,
     TabularValues,
@@ -25,7 +25,12 @@ _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
-SOURCES = ("exact", "q-learning", "expert")
+_SOURCES: dict[str, Callable[[Any], TabularValues | NetworkValues]] = {
+    "exact": solve,
+    "q-learning": learn_values,
+    "expert": lambda task: shipped_expert(task.name),
+}
+SOURCES = tuple(_SOURCES)
 """What `values` of an experiment may say in place of a path."""
 
 
@@ -85,14 +90,10 @@ def make_plan(experiment: Experiment) -> Plan:
 
 
 def _values(source: str, task: Task) -> TabularValues | NetworkValues:
-    if isinstance(task, TabularTask):
-        made = {"exact": solve, "q-learning": learn_values}
-        if source in made:
-            return made[source](task)
-    elif source == "expert":
-        return shipped_expert(task.name)
+    if source in task.value_sources:
+        return _SOURCES[source](task)
     if source in SOURCES:
-        allowed = "'exact', 'q-learning'" if isinstance(task, TabularTask) else "'expert'"
+        allowed = ", ".join(map(repr, task.value_sources))
         raise RequestError(
             f"values = {source!r}; for task {task.name}, {allowed} or the path of a values file "
             "is needed"
@@ -121,9 +122,14 @@ def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     estimates = {}
     for cell in cells:
         condition = plan.conditions[cell.content]
+<<<<<<< HEAD
         tabular = isinstance(condition.task, TabularTask)
         alike = (condition.assistant.name, condition.learner_type.name)
         alike = alike if tabular else condition.learner
+=======
+        tabular = condition.task.states > 0
+        alike = condition.assistant.name if tabular else condition.learner
+>>>>>>> tasks1
         if alike not in seconds:
             measure = _seconds_a_trial if tabular else _seconds_a_deep_trial
             seconds[alike] = measure(condition, plan.experiment.seed)

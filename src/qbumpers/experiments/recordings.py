@@ -14,8 +14,13 @@ from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
+<<<<<<< HEAD
 from qbumpers.simulation import record
 from qbumpers.tasks import TabularTask, Task
+=======
+from qbumpers.simulation import Steps, record
+from qbumpers.tasks import Task
+>>>>>>> tasks1
 from qbumpers.tasks.dynamics import TERMINATED
 
 INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
@@ -88,7 +93,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
             minari.create_dataset_from_buffers(
                 dataset,
                 [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
-                observation_space=_observation_space(task),
+                observation_space=task.observation_space,
                 action_space=gymnasium.spaces.Discrete(task.actions),
                 algorithm_name=condition,
                 description=f"Simulated people at {task.name}, assisted by {condition}.",
@@ -97,6 +102,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
 
 
+<<<<<<< HEAD
 def _observation_space(task: Task) -> gymnasium.Space[Any]:
     if isinstance(task, TabularTask):
         return gymnasium.spaces.Discrete(task.states)
@@ -104,6 +110,9 @@ def _observation_space(task: Task) -> gymnasium.Space[Any]:
 
 
 def _episodes(trial: int, steps: Step) -> Iterator[dict[str, Any]]:
+=======
+def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
+>>>>>>> tasks1
     """The fields of Minari's buffers, an episode each."""
     ends = [*(np.flatnonzero(np.diff(steps.episode)) + 1), len(steps.episode)]
     for first, end in itertools.pairwise([0, *ends]):
