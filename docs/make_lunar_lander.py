@@ -13,17 +13,7 @@ import numpy as np
 import polars as pl
 import tomli_w
 from make_pictures import keep as keep_picture
-from writing import DOCS, measure, template
-
-from qbumpers import make_task
 from qbumpers.analysis.claims import Claim, judged
-from qbumpers.analysis.figures.curves import block_size, courses_figure, curves_figure
-from qbumpers.analysis.figures.quality import quality_figure
-from qbumpers.analysis.figures.runs import run_means, runs_figure
-from qbumpers.analysis.figures.sensitivity import sensitivities, sensitivity_figure
-from qbumpers.analysis.figures.style import NAMES, looks
-from qbumpers.analysis.figures.tradeoffs import tradeoffs, tradeoffs_figure
-from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.keeping import (
     RUNS,
     Kept,
@@ -33,6 +23,16 @@ from qbumpers.analysis.keeping import (
     read_trials,
     write_numbers,
 )
+from writing import DOCS, measure, template
+
+from qbumpers import make_task
+from qbumpers.analysis.figures.curves import block_size, courses_figure, curves_figure
+from qbumpers.analysis.figures.quality import quality_figure
+from qbumpers.analysis.figures.runs import run_means, runs_figure
+from qbumpers.analysis.figures.sensitivity import sensitivities, sensitivity_figure
+from qbumpers.analysis.figures.style import NAMES, looks
+from qbumpers.analysis.figures.tradeoffs import tradeoffs, tradeoffs_figure
+from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.page.headlines import told
 from qbumpers.experts.quality import check_values, summarise
 from qbumpers.values import NetworkValues, load_values

@@ -11,6 +11,7 @@ import polars as pl
 from make_pictures import keep, shrink
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from qbumpers.analysis.section_4_1 import threshold_story
 from writing import DOCS, measure, template
 
 import qbumpers
@@ -21,12 +22,11 @@ from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import trial_measures, trial_samples
 from qbumpers.analysis.published import Comparison, published_numbers
 from qbumpers.analysis.report import Findings, write_report
-from qbumpers.analysis.section_4_1 import threshold_story
-from qbumpers.analysis.statistics import Estimate, mean_interval
+from qbumpers.analysis.statistics import IntervalEstimate, mean_interval
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experiments.store import Results, load
+from qbumpers.reproduction.experiments import profiles, reproduction
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import TabularValues
 
@@ -151,9 +151,9 @@ class Change(NamedTuple):
     """
 
     what: str
-    none: tuple[Estimate, Estimate]
-    thresholding: tuple[Estimate, Estimate]
-    bumpers: tuple[Estimate, Estimate]
+    none: tuple[IntervalEstimate, IntervalEstimate]
+    thresholding: tuple[IntervalEstimate, IntervalEstimate]
+    bumpers: tuple[IntervalEstimate, IntervalEstimate]
 
 
 def changes() -> Iterator[Change]:
@@ -177,7 +177,9 @@ def changes() -> Iterator[Change]:
         )
 
 
-def returns(learner: QLearner, name: str, **options: Any) -> tuple[Estimate, Estimate]:
+def returns(
+    learner: QLearner, name: str, **options: Any
+) -> tuple[IntervalEstimate, IntervalEstimate]:
     """Assisted and unassisted return of 100 learners of Cliff Walking with an assistant."""
     outcomes = simulate(cliff_walking(), make_assistant(name, **options), learner=learner).outcomes
     return (

@@ -12,8 +12,8 @@ from pathlib import Path
 import tomli_w
 
 from qbumpers import make_task
-from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experts.choosing import best, judge
+from qbumpers.reproduction.experiments import profiles, reproduction
 from qbumpers.values import NetworkValues, load_values
 
 TASK = "lunar-lander"

@@ -272,7 +272,7 @@ import sys
 from qbumpers.experiments.cluster import RayCluster
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 
 def report(progress):
     if progress.trials > 0 and trials > 1000:

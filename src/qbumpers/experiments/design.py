@@ -4,7 +4,6 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import ConfigDict, Field, ValidationError, model_validator
@@ -21,6 +20,9 @@ from qbumpers.experiments.learner_designs import (
 )
 from qbumpers.learners import PERCEPTIONS
 from qbumpers.tasks import Task, make_task
+
+REPRODUCTIONS = ("cliff-walking", "lunar-lander")
+"""What `reproduces` may name: published experiments, those of `qbumpers.reproduction`."""
 
 
 class TaskDesign(Model):
@@ -140,8 +142,8 @@ class Experiment(Model):
                     f"learners.name = {learner.name!r}; people of one experiment learn in the same "
                     f"way, and the first ones by {self.learners[0].name!r}"
                 )
-        if self.reproduces is not None and self.reproduces not in reproductions():
-            raise unknown_name("reproduces", self.reproduces, reproductions())
+        if self.reproduces is not None and self.reproduces not in REPRODUCTIONS:
+            raise unknown_name("reproduces", self.reproduces, REPRODUCTIONS)
         return self
 
     @property
@@ -247,15 +249,3 @@ def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
         if option not in defaults or any(other[option] != value for other in others)
     ]
     return "/".join([assistant.name, ",".join(shown)]) if shown else assistant.name
-
-
-def reproductions() -> list[str]:
-    """Names of the published experiments that can be repeated."""
-    files = resources.files("qbumpers.experiments") / "built_in"
-    return sorted(
-        {
-            file.name.removesuffix(".figures.toml")
-            for file in files.iterdir()
-            if file.name.endswith(".figures.toml")
-        }
-    )

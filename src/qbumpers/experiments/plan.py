@@ -9,6 +9,7 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
 from qbumpers.experiments.learner_designs import suitable_learner
+from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
@@ -59,6 +60,9 @@ def make_plan(experiment: Experiment) -> Plan:
 
     Raises:
         RequestError: where the task, values, a learner or an assistant is wrong.
+
+    Warns:
+        ExpertWarning: if the values of a network are no better than random play.
     """
     task = experiment.task.task()
     for learner in experiment.learners:
@@ -83,6 +87,8 @@ def make_plan(experiment: Experiment) -> Plan:
         content = content_digest([experiment.seed, condition.content()]).hex()
         named.append((each, content))
         conditions[content] = condition
+    if not isinstance(task, TabularTask):
+        check_expert(task, values)
     return Plan(experiment, task, values, named, conditions)
 
 

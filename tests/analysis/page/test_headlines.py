@@ -9,13 +9,13 @@ from qbumpers.analysis.findings import Findings, LearnerFindings
 from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.page.headlines import cautions, headlines
 from qbumpers.analysis.published import Comparison
-from qbumpers.analysis.statistics import Estimate
+from qbumpers.analysis.statistics import IntervalEstimate
 from qbumpers.experiments.sources import make_experiment
 from tests.analysis.examples import summary_table
 from tests.experiments.examples import settings
 
-NAN = Estimate(math.nan, math.nan, math.nan)
-SOME = Estimate(-300.0, -320.0, -280.0)
+NAN = IntervalEstimate(math.nan, math.nan, math.nan)
+SOME = IntervalEstimate(-300.0, -320.0, -280.0)
 METHODS = pl.DataFrame(
     {
         "assistant": ["none", "stochastic-q-bumpers"],
@@ -63,13 +63,13 @@ def told(*learners):
 @pytest.mark.parametrize(
     ("method", "reduction", "sentence"),
     [
-        (SOME, Estimate(0.514, 0.42, 0.615),
+        (SOME, IntervalEstimate(0.514, 0.42, 0.615),
          "At matched performance, Stochastic Q Bumpers has 51% less regret in learning than Local "
          "Q-Thresholding (95% interval of the reduction 42% to 62%)."),
-        (SOME, Estimate(-0.05, -0.13, 0.01),
+        (SOME, IntervalEstimate(-0.05, -0.13, 0.01),
          "At matched performance, Stochastic Q Bumpers has 5% more regret in learning than Local "
          "Q-Thresholding (95% interval of the reduction \N{MINUS SIGN}13% to 1%)."),
-        (SOME, Estimate(0.5, math.nan, math.nan),
+        (SOME, IntervalEstimate(0.5, math.nan, math.nan),
          "At matched performance, Stochastic Q Bumpers has 50% less regret in learning than Local "
          "Q-Thresholding (its interval is not known)."),
         (NAN, NAN,

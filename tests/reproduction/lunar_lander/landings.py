@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import tomli_w
 
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 from tests.values.networks import network_of
 
 # Mean returns with and without the assistant, once learned.

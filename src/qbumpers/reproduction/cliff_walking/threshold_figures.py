@@ -8,20 +8,20 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from qbumpers.analysis.figures.style import figure
-from qbumpers.analysis.section_4_1 import (
+from qbumpers.reproduction.cliff_walking.thresholds import (
     EXAMPLES,
     KINDS,
     Move,
-    cells,
     overridden,
     overridden_share,
+    positions,
 )
 from qbumpers.tasks.cliff_walking import COLUMNS, GOAL, ROWS, START, is_cliff, state_of
 
 _OVERRIDDEN, _FREE, _OPTIMAL, _CLIFF = "#d55e00", "#d9e7f2", "#ffffff", "#4d5359"
 _KIND_COLOURS = ("#000000", "#d55e00", "#0072b2")
 _KIND_DASHES = ("-", "--", ":")
-# Corners of a cell's four triangles, by action: up, right, down, left; the middle comes last.
+# Corners of a position's four triangles, by action: up, right, down, left; the middle comes last.
 _CORNERS = np.array(
     [[(0, 0), (1, 0)], [(1, 0), (1, 1)], [(1, 1), (0, 1)], [(0, 1), (0, 0)]], np.float64
 )
@@ -29,7 +29,7 @@ _LETTER_PLACES = ((0.5, 0.17), (0.83, 0.5), (0.5, 0.83), (0.17, 0.5))
 
 
 def values_figure(table: np.ndarray) -> Figure:
-    """Q* of every move on the grid, the two cells of Section 4.1 outlined.
+    """Q* of every move on the grid, the two positions of Section 4.1 outlined.
 
     Args:
         table: float64 [48, 4].
@@ -41,7 +41,7 @@ def values_figure(table: np.ndarray) -> Figure:
         axes = drawing.subplots()
         best = table.max(axis=1, keepdims=True)
         _draw_grid(axes, np.where(table == best, "#cfe8d5", _FREE))
-        for row, column in cells():
+        for row, column in positions():
             for action, (x, y) in enumerate(_LETTER_PLACES):
                 axes.text(
                     column + x, row + y, f"{table[state_of(row, column), action]:g}",
@@ -52,12 +52,12 @@ def values_figure(table: np.ndarray) -> Figure:
             axes.add_collection(
                 PolyCollection([square], facecolor="none", edgecolor="#d55e00", linewidth=2.5)
             )
-        axes.set_title("Q* of each move; optimal moves green, the cells discussed outlined")
+        axes.set_title("Q* of each move; optimal moves green, the grid cells discussed outlined")
     return drawing
 
 
 def overrides_figure(table: np.ndarray, alphas: Sequence[float]) -> Figure:
-    """Which moves Local Q-Thresholding overrides, a map a threshold.
+    """Which moves Local Q-Thresholding overrides, a map per threshold.
 
     Args:
         table: Q*, float64 [48, 4].
@@ -114,9 +114,9 @@ def shares_figure(moves: list[Move]) -> Figure:
 
 
 def _draw_grid(axes: Axes, colours: np.ndarray) -> None:
-    """Cells as four triangles, coloured by state and action [S, A]."""
+    """Positions as four triangles, coloured by state and action [S, A]."""
     triangles, fills = [], []
-    for row, column in cells():
+    for row, column in positions():
         for action in range(4):
             corners = [*(_CORNERS[action] + (column, row)), np.array([column + 0.5, row + 0.5])]
             triangles.append(corners)

@@ -9,9 +9,6 @@ from pathlib import Path
 import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
-
-from qbumpers.analysis.figures.curves import learning_curves, override_courses
-from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.keeping import (
     keep,
     keep_runs,
@@ -19,6 +16,9 @@ from qbumpers.analysis.keeping import (
     read_trials,
     trials_of_runs,
 )
+
+from qbumpers.analysis.figures.curves import learning_curves, override_courses
+from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.measures import trial_measures
 from qbumpers.analysis.report import find, write_report
 from qbumpers.errors import RequestError

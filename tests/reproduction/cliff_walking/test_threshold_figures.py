@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
-
 from qbumpers.analysis.figures.thresholds import overrides_figure, shares_figure, values_figure
 from qbumpers.analysis.section_4_1 import KINDS, cells, overridden, suboptimal_moves
+
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.cliff_walking import state_of
 from qbumpers.values import solve

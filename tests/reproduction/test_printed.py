@@ -8,7 +8,7 @@ import pytest
 
 from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.published import agrees, compare, published_numbers
-from qbumpers.analysis.statistics import Estimate, mean_interval
+from qbumpers.analysis.statistics import IntervalEstimate, mean_interval
 
 NAN = float("nan")
 
@@ -37,19 +37,19 @@ def test_samples_of_truths_six_errors_apart_seldom_agree():
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_the_criterion_is_the_99_per_cent_interval_of_a_difference(offset, sign, verdict):
     # A standard error of 1: two of them, 2.5758 * sqrt(2) = 3.6428.
-    measured = Estimate(10.0, 10 - 1.95996, 10 + 1.95996)
+    measured = IntervalEstimate(10.0, 10 - 1.95996, 10 + 1.95996)
     assert agrees(10 + sign * offset, 0.0, measured) is verdict
     assert agrees(10 + sign * (offset + 0.5), 0.5, measured) is verdict
 
 
 def test_a_number_without_spread_agrees_within_what_printing_leaves_open():
-    assert agrees(87.0, 0.05, Estimate(87.04, 87.04, 87.04)) is True
-    assert agrees(87.0, 0.05, Estimate(87.06, 87.06, 87.06)) is False
+    assert agrees(87.0, 0.05, IntervalEstimate(87.04, 87.04, 87.04)) is True
+    assert agrees(87.0, 0.05, IntervalEstimate(87.06, 87.06, 87.06)) is False
 
 
 @pytest.mark.parametrize("measured", [(NAN, NAN, NAN), (5.0, NAN, NAN), (NAN, 1.0, 2.0)])
 def test_what_was_not_measured_neither_agrees_nor_disagrees(measured):
-    assert agrees(5.0, 0.1, Estimate(*measured)) is None
+    assert agrees(5.0, 0.1, IntervalEstimate(*measured)) is None
 
 
 def test_the_numbers_are_those_that_the_paper_prints():
@@ -98,8 +98,10 @@ SUMMARY = pl.DataFrame(
         "unassisted_high": [-2600.0, None, -20.0],
     }
 )
-REDUCTION = Estimate(0.3, 0.25, 0.35)
-REGRET = Regret(0, "x", "y", 50.0, -500.0, Estimate(-300.0, -310.0, -290.0), -20.0, REDUCTION)
+REDUCTION = IntervalEstimate(0.3, 0.25, 0.35)
+REGRET = Regret(
+    0, "x", "y", 50.0, -500.0, IntervalEstimate(-300.0, -310.0, -290.0), -20.0, REDUCTION
+)
 
 
 def test_conditions_that_were_run_are_compared_and_no_others():
@@ -110,7 +112,7 @@ def test_conditions_that_were_run_are_compared_and_no_others():
     ]
     assert found[0].measured.mean == -126.6
     assert math.isnan(found[0].measured.low)
-    assert found[1].measured == Estimate(87.0, 87.0, 87.0)
+    assert found[1].measured == IntervalEstimate(87.0, 87.0, 87.0)
 
 
 def test_a_printed_range_is_told_as_the_paper_prints_it():

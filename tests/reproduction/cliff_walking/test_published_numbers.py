@@ -8,8 +8,8 @@ from qbumpers.analysis.report import find
 from qbumpers.analysis.statistics import standard_error
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import reproduction
 from qbumpers.experiments.store import load
+from qbumpers.reproduction.experiments import reproduction
 
 TRIALS = 300
 THRESHOLD = "local-q-thresholding/alpha=0.0195"

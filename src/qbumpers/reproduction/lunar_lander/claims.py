@@ -1,13 +1,7 @@
-"""What a paper claims in words, judged from the trials by rules that do not depend on them.
+"""What Section 4.3 of the paper claims of Lunar Lander, judged from the trials."""
 
-Each piece of evidence is an estimate with its interval beside a limit. It speaks for a claim where
-the whole interval lies on the claimed side of the limit, against it where the whole interval lies
-on the other side, and else for neither.
-"""
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import polars as pl
@@ -17,10 +11,9 @@ from qbumpers.analysis.frontier import beaten_share, lead
 from qbumpers.analysis.hypervolume import compare_hypervolumes
 from qbumpers.analysis.measures import trial_samples
 from qbumpers.analysis.resampling import function_interval, resampled_means
-from qbumpers.analysis.statistics import Estimate, bonferroni, difference
-
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told from these trials"
-"""Verdicts."""
+from qbumpers.analysis.statistics import bonferroni, difference
+from qbumpers.experiments.design import Experiment
+from qbumpers.reproduction.claims import Claim, Evidence
 
 LANDING = 200.0
 """Points between landing (+100) and crashing (-100) in Lunar Lander: the unit of its limits."""
@@ -31,102 +24,38 @@ DESTROYED, NEAR, JUST_BELOW = 0.5, 0.25, 0.9
 BUMPERS, THRESHOLDING = "stochastic-q-bumpers", "local-q-thresholding"
 
 
-class Evidence(NamedTuple):
-    """An estimate beside a limit.
-
-    Attributes:
-        condition: the setting that it is about; empty where it is about whole methods.
-        what: is estimated.
-        estimate: with its interval.
-        limit: between speaking for the claim and against it.
-        wanted: "above" or "below" the limit, where it speaks for the claim.
-    """
-
-    condition: str
-    what: str
-    estimate: Estimate
-    limit: float
-    wanted: str
-
-    @property
-    def speaks_for(self) -> bool | None:
-        """Whether it speaks for the claim (True), against it (False) or neither (None)."""
-        above, below = self.estimate.low > self.limit, self.estimate.high < self.limit
-        if not (above or below):
-            return None
-        return above == (self.wanted == "above")
-
-
-class Claim(NamedTuple):
-    """A claim, and what the trials say about it.
-
-    Attributes:
-        title: the claim in short.
-        rule: when it holds.
-        every: whether it is about every setting (True) or about some setting (False).
-        evidence: a row a setting and estimate.
-    """
-
-    title: str
-    rule: str
-    every: bool
-    evidence: Sequence[Evidence]
-
-    @property
-    def settings(self) -> dict[str, bool | None]:
-        """Whether each setting speaks for the claim; all of its evidence must."""
-        found: dict[str, list[bool | None]] = {}
-        for one in self.evidence:
-            found.setdefault(one.condition, []).append(one.speaks_for)
-        return {name: _together(verdicts) for name, verdicts in found.items()}
-
-    @property
-    def about_settings(self) -> bool:
-        """Whether it is about single settings, not whole methods."""
-        return "" not in self.settings
-
-    @property
-    def verdict(self) -> str:
-        """One of `HOLDS`, `FAILS` and `OPEN`."""
-        settings = list(self.settings.values())
-        holds = _together(settings) if self.every else _negated(_together(map(_negated, settings)))
-        return {True: HOLDS, False: FAILS, None: OPEN}[holds]
-
-
-def _together(verdicts: Iterator[bool | None] | Sequence[bool | None]) -> bool | None:
-    """Whether all are true; None where that is not known."""
-    found = list(verdicts)
-    if False in found:
-        return False
-    return None if None in found or not found else True
-
-
-def _negated(verdict: bool | None) -> bool | None:
-    return None if verdict is None else not verdict
-
-
-def judged(
-    name: str, trials: pl.DataFrame, generator: np.random.Generator, paired: bool = False
+def judge_claims(
+    trials: pl.DataFrame, generator: np.random.Generator, paired: bool = False
 ) -> list[Claim]:
-    """The claims of a published experiment, each with its evidence.
+    """The claims of Section 4.3, each with its evidence.
 
     Args:
-        name: of the experiment; those of Section 4.3 are about "lunar-lander".
-        trials: of all its conditions, from `trial_measures`.
+        trials: of all conditions, from `trial_measures`.
         generator: draws resamples of the trials.
         paired: whether trials of equal number belong together (common random numbers).
 
     Returns:
-        The claims whose settings were run; none of another experiment, or of several learners.
+        The claims whose settings were run; none if there are several learners.
     """
-    if name != "lunar-lander" or trials["learner"].n_unique() > 1:
+    if trials["learner"].n_unique() > 1:
         return []
     found = [_destroys(trials, paired), _keeps(trials, paired), _covers(trials, generator, paired)]
     return [claim for claim in found if claim.evidence]
 
 
-def telling(trials: pl.DataFrame) -> list[str]:
-    """The conditions whose course tells most about the claims.
+def experiment_claims(trials: pl.DataFrame, experiment: Experiment) -> list[Claim]:
+    """The claims of Section 4.3, judged alike whenever the trials of an experiment are read.
+
+    Args:
+        trials: of all its conditions, from `trial_measures`.
+        experiment: as run; its seed draws the resamples.
+    """
+    generator = np.random.default_rng([experiment.seed, trials["learner"].n_unique(), 7])
+    return judge_claims(trials, generator, experiment.common_random_numbers)
+
+
+def decisive_conditions(trials: pl.DataFrame) -> list[str]:
+    """The conditions whose learning curves say most about the claims.
 
     Args:
         trials: of one learner, from `trial_measures`.
@@ -146,16 +75,17 @@ def telling(trials: pl.DataFrame) -> list[str]:
 
 
 def _destroys(trials: pl.DataFrame, paired: bool) -> Claim:
-    """Thresholding just below alpha = 1."""
+    """The claim about thresholding just below alpha = 1."""
     settings = _overriding(trials, THRESHOLDING).filter(
         pl.col("alpha") >= JUST_BELOW, pl.col("alpha") < 1
     )
     return Claim(
         "Local Q-Thresholding just below α = 1 destroys learning",
-        f"It holds where at every setting with {JUST_BELOW:g} ≤ α < 1 people who learned with it "
-        f"surely return over {DESTROYED * LANDING:g} points less without it than people who never "
-        "had assistance, and succeed less than half as often. It does not hold where at some "
-        "setting either is surely not so. Intervals hold for all settings at once.",
+        f"It holds if, at every setting with {JUST_BELOW:g} ≤ α < 1, the unassisted return is "
+        f"significantly over {DESTROYED * LANDING:g} points below that of learners without "
+        "assistance, and the unassisted success rate significantly below half of theirs. It does "
+        "not hold if, at some setting, the opposite of either is significant. Intervals hold for "
+        "all settings at once.",
         True,
         [
             *_against_none(trials, settings, "unassisted", -DESTROYED * LANDING, "below", paired),
@@ -165,14 +95,14 @@ def _destroys(trials: pl.DataFrame, paired: bool) -> Claim:
 
 
 def _keeps(trials: pl.DataFrame, paired: bool) -> Claim:
-    """Bumpers at every alpha."""
+    """The claim about bumpers at some alpha."""
     settings = _overriding(trials, BUMPERS)
     return Claim(
         "Stochastic Q Bumpers keeps learning near the unassisted learner's while performance rises",
-        "It holds where at some setting people surely return more with it than people without "
-        f"assistance do in training, and surely less than {NEAR * LANDING:g} points less without "
-        "it than they do. It does not hold where at every setting either is surely not so. "
-        "Intervals hold for all settings at once.",
+        "It holds if, at some setting, the assisted return is significantly larger than the return "
+        "of learners without assistance in training, and the unassisted one is significantly less "
+        f"than {NEAR * LANDING:g} points below theirs. It does not hold if, at every setting, the "
+        "opposite of either is significant. Intervals hold for all settings at once.",
         False,
         [
             *_against_none(trials, settings, "assisted", 0, "above", paired),
@@ -182,9 +112,9 @@ def _keeps(trials: pl.DataFrame, paired: bool) -> Claim:
 
 
 _AGAINST = {
-    "assisted": "return with it, minus no assistance's",
-    "unassisted": "return without it, minus no assistance's",
-    "unassisted_success": "success without it, minus half of no assistance's",
+    "assisted": "assisted return, minus no assistance's",
+    "unassisted": "unassisted return, minus no assistance's",
+    "unassisted_success": "unassisted success rate, minus half of no assistance's",
 }
 
 
@@ -197,7 +127,7 @@ def _against_none(
     paired: bool,
     share: float = 1.0,
 ) -> Iterator[Evidence]:
-    """A measure of each setting, minus a share of what it is without assistance."""
+    """A measure of each setting, minus a share of what learners without assistance have."""
     samples = trial_samples(trials, measure)
     controls = trials.filter(assistant="none")["condition"].unique().to_list()
     names = settings["condition"].to_list()
@@ -217,18 +147,18 @@ def _overriding(trials: pl.DataFrame, assistant: str) -> pl.DataFrame:
 
 
 def _covers(trials: pl.DataFrame, generator: np.random.Generator, paired: bool) -> Claim:
-    """Whole methods against each other."""
+    """The claim about whole methods against each other."""
     ours, theirs = (
         _overriding(trials, name)["condition"].to_list() for name in (BUMPERS, THRESHOLDING)
     )
     known = trial_samples(trials, *RETURNS)
     return Claim(
         "Stochastic Q Bumpers lies above and to the right of Local Q-Thresholding",
-        "It holds where, of the settings that override, bumpers surely beat more than half of "
-        "thresholding's in both returns; where they surely return more without assistance at the "
-        "performance of thresholding's settings, on average over those that they reach, and more "
-        "with assistance at their learning; and where their hypervolume is surely larger. It does "
-        "not hold where any of these is surely not so.",
+        "It holds if, of the settings that override, bumpers significantly beat more than half of "
+        "thresholding's in both returns; if, on average over the settings of thresholding that "
+        "they reach, their unassisted return is significantly larger at equal assisted return, and "
+        "their assisted one at equal unassisted return; and if their hypervolume is significantly "
+        "larger. It does not hold if the opposite of any of these is significant.",
         True,
         list(
             _of_methods(
@@ -242,8 +172,8 @@ def _covers(trials: pl.DataFrame, generator: np.random.Generator, paired: bool) 
 
 
 def _of_methods(
-    ours: dict[str, np.ndarray],
-    theirs: dict[str, np.ndarray],
+    ours: Mapping[str, np.ndarray],
+    theirs: Mapping[str, np.ndarray],
     generator: np.random.Generator,
     paired: bool,
 ) -> Iterator[Evidence]:
@@ -256,8 +186,8 @@ def _of_methods(
     number = len(ours)
     compared: dict[str, tuple[Callable[[np.ndarray, np.ndarray], np.ndarray], float]] = {
         "share of thresholding's settings that bumpers beat in both returns": (beaten_share, 0.5),
-        "return without it at equal return with it, bumpers' lead": (partial(lead, axis=0), 0.0),
-        "return with it at equal return without it, bumpers' lead": (partial(lead, axis=1), 0.0),
+        "unassisted return at equal assisted return, bumpers' lead": (partial(lead, axis=0), 0.0),
+        "assisted return at equal unassisted return, bumpers' lead": (partial(lead, axis=1), 0.0),
     }
     for what, (function, limit) in compared.items():
         found = function_interval(

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
 from qbumpers.analysis.section_4_1 import (
     KINDS,
     cells,
@@ -17,6 +16,7 @@ from qbumpers.analysis.section_4_1 import (
     suboptimal_moves,
     threshold_story,
 )
+
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.cliff_walking import state_of
 from qbumpers.values import solve

@@ -5,7 +5,7 @@ import pytest
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import reproductions
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.sources import overlaid, profiles, reproduction
+from qbumpers.reproduction.experiments import overlaid, profiles, reproduction
 
 # Figure 2: the settings of both methods, as the paper lists them.
 THRESHOLDS = [

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from qbumpers.experiments.sources import load_experiment, reproduction
+from qbumpers.experiments.sources import load_experiment
+from qbumpers.reproduction.experiments import reproduction
 from tests.values.networks import network_of
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -6,7 +6,6 @@ import numpy as np
 import polars as pl
 import pytest
 import scipy.stats
-
 from qbumpers.analysis.claims import (
     FAILS,
     HOLDS,
@@ -16,9 +15,10 @@ from qbumpers.analysis.claims import (
     judged,
     telling,
 )
+
 from qbumpers.analysis.measures import MEASURES
 from qbumpers.analysis.page.headlines import told
-from qbumpers.analysis.statistics import Estimate
+from qbumpers.analysis.statistics import IntervalEstimate
 
 BUMPERS = {alpha: f"stochastic-q-bumpers/alpha={alpha:g}" for alpha in (0.0, 0.5, 1.0)}
 THRESHOLDS = {a: f"local-q-thresholding/alpha={a:g}" for a in (0.0, 0.9, 0.95, 0.999, 1.0)}
@@ -119,13 +119,17 @@ def test_intervals_are_welchs_and_hold_for_all_settings_at_once():
         test = scipy.stats.ttest_ind(own, share * none, equal_var=False)
         low, high = test.confidence_interval(1 - 0.05 / settings)
         rows = [row for row in claim.evidence if row.condition == condition]
-        expected = Estimate(float(own.mean() - share * none.mean()), float(low), float(high))
+        expected = IntervalEstimate(
+            float(own.mean() - share * none.mean()), float(low), float(high)
+        )
         assert any(row.estimate == pytest.approx(expected) for row in rows)
 
 
 def test_evidence_speaks_only_where_the_whole_interval_does():
     def speaks(low, high, wanted):
-        return Evidence("", "", Estimate((low + high) / 2, low, high), 0.0, wanted).speaks_for
+        return Evidence(
+            "", "", IntervalEstimate((low + high) / 2, low, high), 0.0, wanted
+        ).speaks_for
 
     assert (speaks(1, 2, "above"), speaks(1, 2, "below")) == (True, False)
     assert (speaks(-2, -1, "above"), speaks(-2, -1, "below")) == (False, True)
@@ -146,7 +150,7 @@ def test_evidence_speaks_only_where_the_whole_interval_does():
 )
 def test_claims_about_every_and_about_some_setting(every, ends, verdict):
     rows = [
-        Evidence(str(place), "x", Estimate((low + high) / 2, low, high), 0.0, "above")
+        Evidence(str(place), "x", IntervalEstimate((low + high) / 2, low, high), 0.0, "above")
         for place, (low, high) in enumerate(ends)
     ]
     assert Claim("", "", every, rows).verdict == verdict
@@ -154,7 +158,7 @@ def test_claims_about_every_and_about_some_setting(every, ends, verdict):
 
 def test_all_evidence_on_a_setting_must_speak_for_it():
     rows = [
-        Evidence("a", what, Estimate(low + 1, low, low + 2), 0.0, "above")
+        Evidence("a", what, IntervalEstimate(low + 1, low, low + 2), 0.0, "above")
         for what, low in (("x", 1.0), ("y", -1.0))
     ]
     assert Claim("", "", True, rows).settings == {"a": None}

@@ -1,12 +1,11 @@
-"""A finished run as a few small files, fit for a repository, and what can be made of them again."""
+"""A finished run archived as a few small files, fit for a repository, and read again."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import polars as pl
 
-from qbumpers.analysis.claims import telling
 from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.measures import MEASURES, trial_measures
 from qbumpers.errors import RequestError
@@ -16,19 +15,19 @@ from qbumpers.experiments.store import EXPERIMENT, load, run_description
 from qbumpers.files import write_atomically
 
 TRIALS, CURVES, OVERRIDES, RUNS = "trials.csv", "curves.csv", "overrides.csv", "runs.csv"
-"""A row a trial; learning curves and courses of overrides by block of episodes; trials of runs."""
+"""A row per trial; learning curves and override rates by block of episodes; trials of runs."""
 
 _DIGITS = 7  # more would only be noise
 _NUMBERS = {"alpha": pl.Float64, **dict.fromkeys(MEASURES, pl.Float64)}
 
 
-class Kept(NamedTuple):
-    """What was kept of a run.
+class Archive(NamedTuple):
+    """What was archived of a run.
 
     Attributes:
         experiment: as run.
         run: versions and platform that ran it.
-        trials: a row a trial, as from `trial_measures`.
+        trials: a row per trial, as from `trial_measures`.
         curves: learning curves, returns and success rates, as from `learning_curves`.
         overrides: as from `override_courses`.
     """
@@ -40,47 +39,49 @@ class Kept(NamedTuple):
     overrides: pl.DataFrame
 
 
-def keep(folder: str | Path, into: str | Path) -> None:
-    """Keep the trials of a run, and the curves of a few telling conditions, as CSV.
+Choose = Callable[[pl.DataFrame], Sequence[str]]
+"""Chooses conditions, from a table of trials."""
+
+
+def archive_run(folder: str | Path, into: str | Path, choose: Choose) -> None:
+    """Archive the trials of a run, and the curves of a few conditions, as CSV.
 
     Args:
         folder: of the finished run.
-        into: folder for the files; made where it is missing.
+        into: folder for the files; made if it is missing.
+        choose: the conditions whose curves are archived, from the table of trials.
 
     Raises:
-        RequestError: where the folder is not one of a finished run.
-        StoreError: where a file cannot be written.
+        RequestError: if the folder is not one of a finished run.
+        StoreError: if a file cannot be written.
     """
     results = load(folder)
     trials = trial_measures(results.episodes, results.experiment.criterion)
-    chosen = telling(trials)
+    chosen = choose(trials)
     keys = ["condition", "episode", "retention"]
     curves = learning_curves(results.episodes, chosen)
     if results.episodes["unassisted_success"].null_count() == 0:
         more = learning_curves(results.episodes, chosen, "success")
         curves = curves.join(more, on=keys, maintain_order="left")
     overrides = override_courses(results.episodes, chosen)
-    write_numbers(Path(into) / TRIALS, trials)
-    write_numbers(Path(into) / CURVES, curves)
-    write_numbers(Path(into) / OVERRIDES, overrides)
+    write_rounded(Path(into) / TRIALS, trials)
+    write_rounded(Path(into) / CURVES, curves)
+    write_rounded(Path(into) / OVERRIDES, overrides)
     settings = (Path(folder) / EXPERIMENT).read_bytes()
     write_atomically(Path(into) / EXPERIMENT, lambda path: path.write_bytes(settings))
 
 
-def read_kept(folder: str | Path) -> Kept:
-    """What `keep` wrote.
+def load_archive(folder: str | Path) -> Archive:
+    """What `archive_run` wrote.
 
     Args:
         folder: of the files.
 
-    Returns:
-        Their content.
-
     Raises:
-        RequestError: where a file is missing.
+        RequestError: if a file is missing.
     """
     place = Path(folder)
-    return Kept(
+    return Archive(
         experiment=load_experiment(place / EXPERIMENT),
         run=run_description(place),
         trials=read_trials(place / TRIALS),
@@ -89,18 +90,18 @@ def read_kept(folder: str | Path) -> Kept:
     )
 
 
-def keep_runs(folders: Mapping[str, str | Path], into: str | Path) -> None:
-    """Keep the trials of several runs in one table, `RUNS`, with the name of each run.
+def archive_trials(folders: Mapping[str, str | Path], into: str | Path) -> None:
+    """Archive the trials of several runs in one table, `RUNS`, with the name of each run.
 
     Args:
         folders: of finished runs, by name.
-        into: folder for the file; made where it is missing.
+        into: folder for the file; made if it is missing.
 
     Raises:
-        RequestError: where a folder is not one of a finished run.
-        StoreError: where the file cannot be written.
+        RequestError: if a folder is not one of a finished run.
+        StoreError: if the file cannot be written.
     """
-    write_numbers(Path(into) / RUNS, trials_of_runs(folders))
+    write_rounded(Path(into) / RUNS, trials_of_runs(folders))
 
 
 def trials_of_runs(folders: Mapping[str, str | Path]) -> pl.DataFrame:
@@ -110,10 +111,10 @@ def trials_of_runs(folders: Mapping[str, str | Path]) -> pl.DataFrame:
         folders: of finished runs, by name.
 
     Returns:
-        A row a run and trial: run, and the columns of `trial_measures`.
+        A row per run and trial: run, and the columns of `trial_measures`.
 
     Raises:
-        RequestError: where a folder is not one of a finished run.
+        RequestError: if a folder is not one of a finished run.
     """
     parts = []
     for name, folder in folders.items():
@@ -124,19 +125,19 @@ def trials_of_runs(folders: Mapping[str, str | Path]) -> pl.DataFrame:
 
 
 def read_trials(path: str | Path) -> pl.DataFrame:
-    """A table of trials that was kept as CSV; RequestError where there is none."""
+    """A table of trials that was archived as CSV; RequestError if there is none."""
     return _read(Path(path)).with_columns(
         pl.col(name).cast(kind) for name, kind in _NUMBERS.items()
     )
 
 
-def write_numbers(path: Path, table: pl.DataFrame) -> None:
-    """Write a table as CSV, its numbers rounded to what they can tell."""
+def write_rounded(path: Path, table: pl.DataFrame) -> None:
+    """Write a table as CSV, its numbers rounded to seven digits."""
     content = table.with_columns(pl.selectors.float().round_sig_figs(_DIGITS)).write_csv()
     write_atomically(path, lambda temporary: temporary.write_bytes(content.encode()))
 
 
 def _read(path: Path) -> pl.DataFrame:
     if not path.is_file():
-        raise RequestError(f"kept results {path}: there is no such file")
+        raise RequestError(f"archived results {path}: there is no such file")
     return pl.read_csv(path, infer_schema_length=None)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from qbumpers.analysis.numerals import digits_for
+from qbumpers.analysis.formatting import digits_for
 from qbumpers.analysis.statistics import mean_interval
 
 

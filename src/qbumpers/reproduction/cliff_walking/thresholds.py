@@ -1,6 +1,6 @@
 """Why no threshold serves on Cliff Walking: Section 4.1 of the paper, computed.
 
-Local Q-Thresholding overrides a suboptimal move exactly where alpha is below a critical value of
+Local Q-Thresholding overrides a suboptimal move exactly if alpha is below a critical value of
 the move. The figures show which moves those are.
 """
 
@@ -17,18 +17,18 @@ KINDS = ("onto the cliff", "backwards beside the cliff", "away from the cliff")
 """Suboptimal moves: those that fall; others beside the cliff or at the start; all the rest."""
 
 EXAMPLES = ((2, 6), (1, 6))
-"""The cells that Section 4.1 discusses: beside the cliff, and one above."""
+"""The positions that Section 4.1 discusses, as (row, column): beside the cliff, and one above."""
 
 
 class Move(NamedTuple):
     """A suboptimal move.
 
     Attributes:
-        row: of the cell it starts from.
-        column: of that cell.
+        row: where it starts.
+        column: where it starts.
         action: its number.
         kind: index into `KINDS`.
-        critical: it is overridden where alpha is below this.
+        critical: it is overridden if alpha is below this.
     """
 
     row: int
@@ -38,8 +38,8 @@ class Move(NamedTuple):
     critical: float
 
 
-def cells() -> list[tuple[int, int]]:
-    """The cells that a walker can act in: all but the cliff and the goal."""
+def positions() -> list[tuple[int, int]]:
+    """Where a walker can act, as (row, column): everywhere but on the cliff and at the goal."""
     return [
         (row, column)
         for row, column in np.ndindex(ROWS, COLUMNS)
@@ -54,10 +54,10 @@ def suboptimal_moves(table: np.ndarray) -> list[Move]:
         table: Q*, float64 [S, A].
 
     Returns:
-        The moves, by cell; critical = (V - Q(a)) / (V - min Q), from Q' < (1 - alpha) V'.
+        The moves, by position; critical = (V - Q(a)) / (V - min Q), from Q' < (1 - alpha) V'.
     """
     moves = []
-    for row, column in cells():
+    for row, column in positions():
         values = table[state_of(row, column)]
         best, worst = values.max(), values.min()
         for action in np.flatnonzero(values < best):
@@ -95,7 +95,16 @@ def overridden(table: np.ndarray, alpha: float, second: bool = False) -> np.ndar
 
 
 def overridden_share(moves: list[Move], kind: int, alphas: np.ndarray) -> np.ndarray:
-    """Share of the moves of a kind that are overridden, at each alpha; float64 [N]."""
+    """Share of the moves of a kind that are overridden.
+
+    Args:
+        moves: from `suboptimal_moves`.
+        kind: index into `KINDS`.
+        alphas: float64 [N], thresholds.
+
+    Returns:
+        float64 [N].
+    """
     critical = np.sort([move.critical for move in moves if move.kind == kind])
     return 1 - np.searchsorted(critical, alphas, side="right") / len(critical)
 
@@ -106,17 +115,23 @@ def distinct_thresholds(moves: list[Move]) -> list[float]:
 
 
 def distinct_behaviours(table: np.ndarray, alphas: Sequence[float], second: bool) -> int:
-    """How many different sets of moves these thresholds override, in cells a walker can act in."""
-    acted = [state_of(row, column) for row, column in cells()]
+    """How many different sets of moves these thresholds override, where a walker can act.
+
+    Args:
+        table: Q*, float64 [S, A].
+        alphas: the thresholds.
+        second: whether they override with the second-best action.
+    """
+    acted = [state_of(row, column) for row, column in positions()]
     return len({overridden(table, alpha, second)[acted].tobytes() for alpha in alphas})
 
 
-class ThresholdStory(NamedTuple):
+class ThresholdSummary(NamedTuple):
     """The numbers of Section 4.1.
 
     Attributes:
-        examples: suboptimal moves of the cells that the section discusses, as (row, column,
-            name of the action, its Q value, the best Q value there, critical threshold).
+        examples: suboptimal moves from `EXAMPLES`, as (row, column, name of the action, its Q
+            value, the best Q value there, critical threshold).
         thresholds: at which the assistant's behaviour changes, falling.
         alphas: settings that the experiment compares.
         behaviours_best: how many different behaviours they give with best-action overrides.
@@ -130,12 +145,12 @@ class ThresholdStory(NamedTuple):
     behaviours_second: int
 
 
-def threshold_story(table: np.ndarray, alphas: Sequence[float]) -> ThresholdStory:
+def summarise_thresholds(table: np.ndarray, alphas: Sequence[float]) -> ThresholdSummary:
     """The numbers of Section 4.1.
 
     Args:
         table: Q* of Cliff Walking, float64 [48, 4].
-        alphas: settings of Local Q-Thresholding to be told apart.
+        alphas: settings of Local Q-Thresholding to be compared.
 
     Returns:
         The numbers.
@@ -149,7 +164,7 @@ def threshold_story(table: np.ndarray, alphas: Sequence[float]) -> ThresholdStor
             examples.append(
                 (move.row, move.column, name, value, float(values.max()), move.critical)
             )
-    return ThresholdStory(
+    return ThresholdSummary(
         examples=examples,
         thresholds=distinct_thresholds(moves),
         alphas=list(alphas),

@@ -5,7 +5,7 @@ import pytest
 from qbumpers.analysis.report import write_report
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 
 
 @pytest.fixture(scope="session")
