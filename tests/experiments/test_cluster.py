@@ -30,6 +30,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::FutureWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+    pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning"),  # a random network
 ]
 
 # Loopback only, and nothing written to the home folder. A cluster that is not started by RayCluster

@@ -1,11 +1,14 @@
 """The built-in experiments hold what Figure 2 of the paper compares."""
 
+from pathlib import Path
+
 import pytest
 
+import qbumpers.reproduction as reproduction_package
 from qbumpers.errors import RequestError
-from qbumpers.experiments.design import reproductions
+from qbumpers.experiments.design import REPRODUCTIONS
 from qbumpers.experiments.plan import make_plan
-from qbumpers.reproduction.experiments import overlaid, profiles, reproduction
+from qbumpers.reproduction.experiments import command, overlaid, profiles, reproduction
 
 # Figure 2: the settings of both methods, as the paper lists them.
 THRESHOLDS = [
@@ -40,7 +43,10 @@ def leaves(data, path=""):
 
 
 def test_there_are_two_published_experiments_with_their_profiles():
-    assert reproductions() == ["cliff-walking", "lunar-lander"]
+    folder = Path(reproduction_package.__file__).parent
+    folders = {path.parent.name for path in folder.glob("*/profiles")}
+    assert {name.replace("-", "_") for name in REPRODUCTIONS} == folders
+    assert folders == {"cliff_walking", "lunar_lander"}
     assert profiles("cliff-walking") == list(PROFILES)
     assert profiles("lunar-lander") == ["figures", *SENSITIVITY]
 
@@ -130,7 +136,7 @@ def test_figure_4_has_both_methods_by_tenths_and_18_more_thresholds():
             assert (options["v_min"], options["p_max"]) == (0.0, 0.999)
 
 
-def test_the_people_of_figure_4_are_the_papers():
+def test_the_learners_of_figure_4_are_the_papers():
     [design] = reproduction("lunar-lander").learners
     learner = design.learner(task_discount=0.99)
     assert (design.name, design.perception) == ("double-dqn", "transition")
@@ -159,7 +165,7 @@ def test_given_alphas_replace_those_of_both_methods_and_nothing_else(name):
     assert fewer.model_copy(update=same) == whole
 
 
-def same_people(learner):
+def same_learner(learner):
     return learner.model_copy(update={"epsilon": None})
 
 
@@ -175,14 +181,14 @@ def test_the_quick_version_has_both_methods_and_a_folder_of_its_own(profile):
         "none", "maximal", "local-q-thresholding", "stochastic-q-bumpers",
     }  # fmt: skip
     whole = reproduction("lunar-lander", profile)
-    assert [same_people(each) for each in quick.learners] == [
-        same_people(each) for each in whole.learners
+    assert [same_learner(each) for each in quick.learners] == [
+        same_learner(each) for each in whole.learners
     ]
     if profile != "long-exploration":  # whose exploration cannot end later than the episodes do
         assert decays(quick) == decays(whole) == [200]
     pairs = (
         len(quick.conditions()) * quick.trials * quick.episodes * 250
-    )  # a step with help, one alone
+    )  # an assisted step and an unassisted one
     assert pairs * 51e-6 / 2 < 200  # seconds on two cores, of the five minutes that it may take
 
 
@@ -233,3 +239,10 @@ def test_settings_are_overlaid_table_by_table():
     }  # fmt: skip
     longer = {"l": [{"q": 5}, {"q": 6}]}
     assert overlaid(base, longer)["l"] == longer["l"]
+
+
+def test_the_command_of_a_profile_repeats_it_and_other_experiments_have_none():
+    made = reproduction("lunar-lander", "relu", trials=3, seed=5)
+    assert command(made) == "qbumpers reproduce lunar-lander --profile relu --trials 3 --seed 5"
+    assert command(made.model_copy(update={"episodes": 9})) == ""
+    assert command(made.model_copy(update={"reproduces": None})) == ""

@@ -7,8 +7,15 @@ import polars as pl
 import pytest
 
 from qbumpers.analysis.frontier import Regret
-from qbumpers.analysis.published import agrees, compare, published_numbers
 from qbumpers.analysis.statistics import IntervalEstimate, mean_interval
+from qbumpers.reproduction.printed import (
+    Comparison,
+    agrees,
+    compare,
+    disagreements,
+    printed_marks,
+    printed_numbers,
+)
 
 NAN = float("nan")
 
@@ -53,7 +60,7 @@ def test_what_was_not_measured_neither_agrees_nor_disagrees(measured):
 
 
 def test_the_numbers_are_those_that_the_paper_prints():
-    numbers = published_numbers("cliff-walking")
+    numbers = printed_numbers("cliff-walking")
     printed = {(n["condition"], n["measure"]): n["value"] for n in numbers["number"]}
     bumpers, thresholds = "stochastic-q-bumpers/alpha=", "local-q-thresholding/alpha="
     # Section 4.2 and Figure 2; "51..52" for 0.0195, so 51.5 with half a unit either way.
@@ -82,11 +89,6 @@ def test_the_numbers_are_those_that_the_paper_prints():
     assert gain == pytest.approx(0.43, abs=0.005)
 
 
-def test_an_experiment_that_was_not_published_has_no_numbers():
-    assert published_numbers("frozen-lake") == {"number": [], "regret": []}
-    assert published_numbers("") == {"number": [], "regret": []}
-
-
 SUMMARY = pl.DataFrame(
     {
         "condition": ["maximal", "local-q-thresholding/alpha=1", "none"],
@@ -105,7 +107,7 @@ REGRET = Regret(
 
 
 def test_conditions_that_were_run_are_compared_and_no_others():
-    found = compare(published_numbers("cliff-walking"), SUMMARY, {})
+    found = compare(printed_numbers("cliff-walking"), SUMMARY, {})
     assert [(row.what, row.published, row.agrees) for row in found] == [
         ("local-q-thresholding/alpha=1, unassisted", -26.6, None),
         ("maximal, assisted", 87.0, True),
@@ -128,13 +130,32 @@ def test_a_printed_range_is_told_as_the_paper_prints_it():
 
 
 def test_regrets_are_compared_by_what_is_matched():
-    found = compare(published_numbers("cliff-walking"), SUMMARY, {"performance": REGRET})[2:]
+    found = compare(printed_numbers("cliff-walking"), SUMMARY, {"performance": REGRET})[2:]
     assert [(row.what, row.published, row.agrees) for row in found] == [
         ("less regret in learning, matched performance", 0.51, False),
         ("less regret in learning, matched performance", 0.574, False),
     ]
     assert found[0].measured == REDUCTION
     assert "57%" in found[0].note
-    [row] = compare({"number": [], "regret": published_numbers("cliff-walking")["regret"]}, SUMMARY,
+    [row] = compare({"number": [], "regret": printed_numbers("cliff-walking")["regret"]}, SUMMARY,
                     {"learning": REGRET})  # fmt: skip
     assert row.what == "less regret in performance, matched learning"
+
+
+def test_disagreement_with_the_paper_is_cautioned_about():
+    unknown = IntervalEstimate(0.5, NAN, NAN)
+    verdicts = [True, False, None, False]
+    rows = [Comparison("x", 1.0, "1", unknown, verdict, "") for verdict in verdicts]
+    [caution] = disagreements(rows)
+    assert caution.startswith("2 of 4 numbers that the paper prints disagree")
+    assert disagreements(rows[:1]) == []
+
+
+def test_points_of_the_paper_need_both_numbers():
+    marks = printed_marks(printed_numbers("cliff-walking"))
+    assert marks.points == {
+        "stochastic-q-bumpers/alpha=0.7": (53.9, -222.6),
+        "stochastic-q-bumpers/alpha=0.2": (66.6, -465.6),
+        "local-q-thresholding/alpha=0.0195": (51.5, -486.5),
+        "local-q-thresholding/alpha=0.0191": (51.3, -486.9),
+    }

@@ -76,7 +76,7 @@ def against(trials: pl.DataFrame, control: str, measure: str, paired: bool = Fal
 def optimal(
     trials: pl.DataFrame, generator: np.random.Generator, paired: bool = False
 ) -> pl.DataFrame:
-    """Which conditions are Pareto-optimal in assisted and unassisted return, and how certain that is.
+    """Which conditions are Pareto-optimal in both returns, and how certain that is.
 
     Args:
         trials: of one learner, from `trial_measures`.

@@ -12,8 +12,8 @@ from PIL import Image
 
 import qbumpers
 from qbumpers.analysis.figures.style import readable
-from qbumpers.analysis.report import find
 from qbumpers.experiments.store import load
+from qbumpers.reproduction.report import find
 from tests.analysis.pages import Page, content, interval, number
 
 FIGURES = [

@@ -4,9 +4,18 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
-from qbumpers.analysis.figures.thresholds import overrides_figure, shares_figure, values_figure
-from qbumpers.analysis.section_4_1 import KINDS, cells, overridden, suboptimal_moves
 
+from qbumpers.reproduction.cliff_walking.threshold_figures import (
+    overrides_figure,
+    shares_figure,
+    values_figure,
+)
+from qbumpers.reproduction.cliff_walking.thresholds import (
+    KINDS,
+    overridden,
+    positions,
+    suboptimal_moves,
+)
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.cliff_walking import state_of
 from qbumpers.values import solve
@@ -19,7 +28,7 @@ SIDES = {0: (0.5, 1 / 6), 1: (5 / 6, 0.5), 2: (0.5, 5 / 6), 3: (1 / 6, 0.5)}
 
 def triangles(axes):
     """The colour of each move's triangle, by row, column and action."""
-    collection = next(c for c in axes.collections if len(c.get_paths()) == 4 * len(cells()))
+    collection = next(c for c in axes.collections if len(c.get_paths()) == 4 * len(positions()))
     assert isinstance(collection, PolyCollection)
     found = {}
     for path, ink in zip(collection.get_paths(), collection.get_facecolor(), strict=True):
@@ -33,7 +42,7 @@ def triangles(axes):
 def test_every_move_bears_its_value():
     [axes] = values_figure(TABLE).axes
     numbers = {text.get_position(): text.get_text() for text in axes.texts}
-    for row, column in cells():
+    for row, column in positions():
         for action, (x, y) in SIDES.items():
             [text] = [
                 label

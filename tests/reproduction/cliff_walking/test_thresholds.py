@@ -6,17 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from qbumpers.analysis.section_4_1 import (
+
+from qbumpers.reproduction.cliff_walking.thresholds import (
     KINDS,
-    cells,
     distinct_behaviours,
     distinct_thresholds,
     overridden,
     overridden_share,
+    positions,
     suboptimal_moves,
-    threshold_story,
+    summarise_thresholds,
 )
-
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.cliff_walking import state_of
 from qbumpers.values import solve
@@ -84,8 +84,8 @@ def test_the_values_are_those_that_the_paper_prints():
 
 
 def test_a_walker_acts_everywhere_but_on_the_cliff_and_the_goal():
-    assert set(cells()) == DISTANCE.keys() - {GOAL}
-    assert len(cells()) == 48 - 10 - 1
+    assert set(positions()) == DISTANCE.keys() - {GOAL}
+    assert len(positions()) == 48 - 10 - 1
 
 
 def test_critical_thresholds_are_those_of_distances_counted_anew():
@@ -119,7 +119,7 @@ def test_the_rule_overrides_exactly_the_moves_below_their_critical_value(alpha):
     decided = overridden(TABLE, alpha)
     found = {
         (row, column, name)
-        for row, column in cells()
+        for row, column in positions()
         for action, name in enumerate(STEPS)
         if decided[state_of(row, column), action]
     }
@@ -191,7 +191,7 @@ def critical_of(move):
 
 
 def test_the_story_tells_the_two_cells_and_the_behaviours():
-    story = threshold_story(TABLE, PAPER)
+    story = summarise_thresholds(TABLE, PAPER)
     told = {(row, column, name): rest for row, column, name, *rest in story.examples}
     assert told == {
         (1, 6, "up"): [91, 93, 1.0],

@@ -1,24 +1,19 @@
 """Claims in words, judged from trials whose truth is known."""
 
-import math
-
 import numpy as np
 import polars as pl
 import pytest
 import scipy.stats
-from qbumpers.analysis.claims import (
+
+from qbumpers.analysis.measures import MEASURES
+from qbumpers.analysis.statistics import IntervalEstimate
+from qbumpers.reproduction.claims import (
     FAILS,
     HOLDS,
     OPEN,
-    Claim,
-    Evidence,
-    judged,
-    telling,
+    claim_sentence,
 )
-
-from qbumpers.analysis.measures import MEASURES
-from qbumpers.analysis.page.headlines import told
-from qbumpers.analysis.statistics import IntervalEstimate
+from qbumpers.reproduction.lunar_lander.claims import decisive_conditions, judge_claims
 
 BUMPERS = {alpha: f"stochastic-q-bumpers/alpha={alpha:g}" for alpha in (0.0, 0.5, 1.0)}
 THRESHOLDS = {a: f"local-q-thresholding/alpha={a:g}" for a in (0.0, 0.9, 0.95, 0.999, 1.0)}
@@ -66,7 +61,7 @@ REVERSED = {
 
 
 def judge(world, **changes):
-    return judged("lunar-lander", trials_of(**world, **changes), np.random.default_rng(1))
+    return judge_claims(trials_of(**world, **changes), np.random.default_rng(1))
 
 
 @pytest.mark.parametrize(
@@ -106,7 +101,7 @@ def test_performance_that_rises_where_learning_goes_does_not_keep_it():
 
 def test_intervals_are_welchs_and_hold_for_all_settings_at_once():
     trials = trials_of(**AS_CLAIMED)
-    destroys, keeps, _ = judged("lunar-lander", trials, np.random.default_rng(1))
+    destroys, keeps, _ = judge_claims(trials, np.random.default_rng(1))
     for claim, measure, condition, share, settings in (
         (destroys, "unassisted", THRESHOLDS[0.9], 1.0, 3),
         (destroys, "unassisted_success", THRESHOLDS[0.999], 0.5, 3),
@@ -125,54 +120,14 @@ def test_intervals_are_welchs_and_hold_for_all_settings_at_once():
         assert any(row.estimate == pytest.approx(expected) for row in rows)
 
 
-def test_evidence_speaks_only_where_the_whole_interval_does():
-    def speaks(low, high, wanted):
-        return Evidence(
-            "", "", IntervalEstimate((low + high) / 2, low, high), 0.0, wanted
-        ).speaks_for
-
-    assert (speaks(1, 2, "above"), speaks(1, 2, "below")) == (True, False)
-    assert (speaks(-2, -1, "above"), speaks(-2, -1, "below")) == (False, True)
-    assert speaks(-1, 1, "above") is None
-    assert speaks(math.nan, math.nan, "below") is None
-
-
-@pytest.mark.parametrize(
-    ("every", "ends", "verdict"),
-    [
-        (True, [(1, 2), (3, 4)], HOLDS),
-        (True, [(1, 2), (-1, 4)], OPEN),
-        (True, [(-2, -1), (-1, 4)], FAILS),
-        (False, [(-2, -1), (3, 4)], HOLDS),
-        (False, [(-2, -1), (-1, 4)], OPEN),
-        (False, [(-2, -1), (-4, -3)], FAILS),
-    ],
-)
-def test_claims_about_every_and_about_some_setting(every, ends, verdict):
-    rows = [
-        Evidence(str(place), "x", IntervalEstimate((low + high) / 2, low, high), 0.0, "above")
-        for place, (low, high) in enumerate(ends)
-    ]
-    assert Claim("", "", every, rows).verdict == verdict
-
-
-def test_all_evidence_on_a_setting_must_speak_for_it():
-    rows = [
-        Evidence("a", what, IntervalEstimate(low + 1, low, low + 2), 0.0, "above")
-        for what, low in (("x", 1.0), ("y", -1.0))
-    ]
-    assert Claim("", "", True, rows).settings == {"a": None}
-
-
 def test_what_was_not_run_is_not_judged():
     nothing = trials_of({}, {})
-    assert judged("lunar-lander", nothing, np.random.default_rng(1)) == []
+    assert judge_claims(nothing, np.random.default_rng(1)) == []
     trials = trials_of(**AS_CLAIMED)
-    assert judged("cliff-walking", trials, np.random.default_rng(1)) == []
     two = pl.concat([trials, trials.with_columns(learner=pl.lit("another"))])
-    assert judged("lunar-lander", two, np.random.default_rng(1)) == []
-    alone = judged("lunar-lander", trials.filter(pl.col("assistant") != "none"),
-                   np.random.default_rng(1))  # fmt: skip
+    assert judge_claims(two, np.random.default_rng(1)) == []
+    alone = judge_claims(trials.filter(pl.col("assistant") != "none"),
+                         np.random.default_rng(1))  # fmt: skip
     assert [claim.title.rpartition(" of ")[2] for claim in alone] == ["Local Q-Thresholding"]
 
 
@@ -180,13 +135,18 @@ def test_single_trials_tell_nothing():
     assert {claim.verdict for claim in judge(AS_CLAIMED, trials=1)} == {OPEN}
 
 
-def test_the_telling_conditions_are_the_best_bumpers_and_the_weakest_thresholding():
-    assert telling(trials_of(**AS_CLAIMED)) == ["none", "maximal", BUMPERS[1.0], THRESHOLDS[0.999]]
-    assert telling(trials_of({}, {})) == ["none", "maximal"]
+def test_the_decisive_conditions_are_the_best_bumpers_and_the_weakest_thresholding():
+    assert decisive_conditions(trials_of(**AS_CLAIMED)) == [
+        "none",
+        "maximal",
+        BUMPERS[1.0],
+        THRESHOLDS[0.999],
+    ]
+    assert decisive_conditions(trials_of({}, {})) == ["none", "maximal"]
 
 
 def test_a_claim_on_a_single_setting_says_how_few_were_tried():
     destroys, _, covers = judge({**AS_CLAIMED, "thresholds": {0.9: (170.0, -150.0, 0.05)}})
     end = "destroys learning: holds (of 1 setting tried, 1 for it, 0 against it)."
-    assert told(destroys).endswith(end)
-    assert told(covers).endswith("Local Q-Thresholding: holds.")
+    assert claim_sentence(destroys).endswith(end)
+    assert claim_sentence(covers).endswith("Local Q-Thresholding: holds.")

@@ -1,4 +1,4 @@
-"""Lunar Lander: its report, what is kept of it, and the page that is made of that; all made up."""
+"""Lunar Lander: its report, its archive, and the page that is made of that; all made up."""
 
 import importlib
 import subprocess
@@ -9,25 +9,26 @@ from pathlib import Path
 import polars as pl
 import pytest
 from polars.testing import assert_frame_equal
-from qbumpers.analysis.keeping import (
-    keep,
-    keep_runs,
-    read_kept,
+
+from qbumpers.analysis.archive import (
+    archive_run,
+    archive_trials,
+    load_archive,
     read_trials,
     trials_of_runs,
 )
-
 from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.measures import trial_measures
-from qbumpers.analysis.report import find, write_report
 from qbumpers.errors import RequestError
 from qbumpers.experiments.store import load
+from qbumpers.reproduction.lunar_lander.claims import decisive_conditions, experiment_claims
+from qbumpers.reproduction.report import find, write_report
 from qbumpers.values import shipped
-from tests.analysis.landings import made_up
 from tests.analysis.pages import Page
+from tests.reproduction.lunar_lander.landings import made_up
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 FEW = [
     {"name": "none"},
     {"name": "maximal"},
@@ -55,8 +56,8 @@ def page(landed):
 @pytest.fixture(scope="module")
 def kept(landed, tmp_path_factory):
     folder = tmp_path_factory.mktemp("kept")
-    keep(landed, folder)
-    keep_runs({"relu": landed, "of=two": landed}, folder)
+    archive_run(landed, folder, decisive_conditions)
+    archive_trials({"relu": landed, "of=two": landed}, folder)
     return folder
 
 
@@ -74,7 +75,7 @@ def test_a_run_without_states_is_reported_with_claims_and_without_maps(landed, p
     assert "The paper prints no numbers for it" in page.text
 
 
-def test_curves_of_the_telling_conditions_are_drawn_by_blocks(landed):
+def test_curves_of_the_decisive_conditions_are_drawn_by_blocks(landed):
     for name in ("learning-curves", "success-curves"):
         numbers = pl.read_csv(landed / "figures" / f"{name}.csv")
         assert numbers["condition"].unique(maintain_order=True).to_list() == CHOSEN
@@ -104,23 +105,24 @@ def test_success_and_crash_rates_are_in_the_table_of_conditions(landed, page):
     row = pl.read_csv(landed / "summary.csv").row(0, named=True)
     for event in ("success", "crash"):
         share = f"{100 * row[f'unassisted_{event}_mean']:.0f}%"
-        assert none[head.index(f"{event} without it")] == share
+        assert none[head.index(f"unassisted {event}")] == share
 
 
 @pytest.mark.parametrize(("trials", "claims"), [(1, 2), (2, 3)])
 def test_few_trials_are_judged_as_far_as_they_go(tmp_path, trials, claims):
     results = load(made_up(tmp_path, trials=trials, episodes=5, assistants=FEW))
-    assert len(find(results).claims) == claims
+    [section] = find(results).additions.sections
+    assert sum("<h3>" in str(part) for part in section.content) == claims
 
 
 @pytest.mark.slow
 def test_a_single_trial_is_reported_too(tmp_path):
     write_report(made_up(tmp_path, trials=1, episodes=5, assistants=FEW))
-    assert "There is one trial a condition" in (tmp_path / "report.html").read_text("utf-8")
+    assert "There is one trial per condition" in (tmp_path / "report.html").read_text("utf-8")
 
 
 def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
-    found, results = read_kept(kept), load(landed)
+    found, results = load_archive(kept), load(landed)
     assert found.experiment == results.experiment
     assert found.run["format"] == 2
     trials = trial_measures(results.episodes, results.experiment.criterion)
@@ -133,7 +135,14 @@ def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
     assert_frame_equal(found.overrides, courses, rel_tol=1e-6)
     again, before = find_tables(found.trials, found.experiment), find(results)
     assert_frame_equal(again.summary, before.summary, rel_tol=1e-4)
-    assert [claim.verdict for claim in again.claims] == [claim.verdict for claim in before.claims]
+    archived, fresh = (
+        [claim.verdict for claim in experiment_claims(each, found.experiment)]
+        for each in (found.trials, trials)
+    )
+    assert archived == fresh
+    assert before.additions.tables["claims.csv"]["verdict"].unique().sort().to_list() == sorted(
+        set(fresh)
+    )
 
 
 def test_trials_of_several_runs_are_kept_with_their_names(landed, kept):
@@ -148,9 +157,9 @@ def test_what_was_not_kept_or_did_not_finish_is_named(kept, tmp_path):
         read_trials(tmp_path / "trials.csv")
     (tmp_path / "experiment.toml").write_bytes((kept / "experiment.toml").read_bytes())
     with pytest.raises(RequestError, match=r"trials\.csv: there is no such file"):
-        read_kept(tmp_path)
+        load_archive(tmp_path)
     with pytest.raises(RequestError, match="holds no experiment"):
-        keep(tmp_path / "nowhere", tmp_path)
+        archive_run(tmp_path / "nowhere", tmp_path, decisive_conditions)
 
 
 @pytest.fixture
@@ -181,7 +190,9 @@ def test_the_page_is_made_from_a_run_and_again_from_what_was_kept(landed, write_
     about = tomllib.loads((data / "about.toml").read_text(encoding="utf-8"))
     assert about == {"hours": 2.5, "machine": "two cores"}
     assert "the run took 2.5 hours on two cores" in first
-    for claim in find(load(landed)).claims:
+    results = load(landed)
+    trials = trial_measures(results.episodes, results.experiment.criterion)
+    for claim in experiment_claims(trials, results.experiment):
         assert f"- {claim.title}: {claim.verdict}" in first
         assert f"### {claim.title}\n\n**{claim.verdict.capitalize()}.**" in first
     assert "| second expert | 3 |" in first
@@ -208,8 +219,8 @@ def test_words_on_the_results_are_told_until_others_are_kept(landed, write_page,
     assert "What to make of it" not in text
 
 
-def claims_that(exceed, episodes=6):
-    """Made-up claims: greedy episodes of ten steps, and others with a crash after three."""
+def checks_that(exceed, episodes=6):
+    """Made-up checks: greedy episodes of ten steps, and others with a crash after three."""
     rows = [
         ("greedy" if greedy else "10% random", episode, time, None if greedy else 3 - time, 0.5)
         for greedy in (True, False)
@@ -231,7 +242,7 @@ def test_q_values_are_checked_kept_and_told(kept, write_page, monkeypatch, tmp_p
     monkeypatch.setattr(
         importlib.import_module("make_lunar_lander"),
         "check_values",
-        lambda task, values, *, discount: claims_that(next(excesses)),
+        lambda task, values, *, discount: checks_that(next(excesses)),
     )
     asked = ["--quality", f"expert={file}", f"a=second={file}"]
     text, drawn = write_page(tmp_path / "page", "--data", str(kept), *asked)

@@ -11,7 +11,7 @@ from qbumpers.experiments.sources import load_experiment
 from qbumpers.reproduction.experiments import reproduction
 from tests.values.networks import network_of
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 PROFILES = ["dueling", "learning-rate-5e-4", "long-exploration", "relu"]
 CONDITIONS = {
     "none",
