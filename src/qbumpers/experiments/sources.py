@@ -20,7 +20,7 @@ def make_experiment(
 
     Args:
         settings: what a TOML file would hold.
-        where: for messages, for instance the path of the file.
+        where: for messages, for example the path of the file.
         large: whether more than `MANY_CELLS` cells of work are meant.
 
     Returns:
@@ -78,7 +78,7 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
 
     Args:
         content: of the file.
-        where: for the message, for instance the path of the file.
+        where: for the message, for example the path of the file.
 
     Returns:
         Its tables.
