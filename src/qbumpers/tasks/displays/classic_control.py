@@ -6,6 +6,7 @@ from typing import Any
 
 from qbumpers.decisions import Step
 from qbumpers.tasks.display import (
+    MOVES,
     Display,
     Scene,
     Shape,
@@ -89,7 +90,10 @@ def mountain_car_display() -> Display:
 def _display(
     actions: tuple[str, ...], rate: float, idle: int, backdrop: Sequence[Shape], scene: Scene
 ) -> Display:
+    keys = move_keys(actions)
+    if idle >= 0:
+        keys |= dict.fromkeys(MOVES["down"], idle)
     return Display(
-        width=_WIDTH, height=_HEIGHT, actions=actions, keys=move_keys(actions), rate=rate,
+        width=_WIDTH, height=_HEIGHT, actions=actions, keys=keys, rate=rate,
         idle=idle, backdrop=backdrop, scene=scene,
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """Lunar Lander: hull, legs and flames above the terrain of the episode."""
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -30,9 +31,10 @@ HULL = "#8066e6"
 
 _KEYS = {
     "ArrowLeft": 1, "KeyA": 1, "ArrowUp": 2, "KeyW": 2, "ArrowRight": 3, "KeyD": 3,
+    "ArrowDown": 0, "KeyS": 0,
 }  # fmt: skip
 _ACROSS, _UP = WIDTH * SCALE, HEIGHT * SCALE  # 600 x 400
-_LEG_ANGLE = 0.348  # of a leg to the hull, radians, where Box2D holds it in flight and at rest
+_LEG_ANGLES = np.linspace(0.348, 0.9, 13)  # to the hull, radians: held by its motor, to its limit
 _EDGE = "#4d4d80"
 _STARS = 70
 
@@ -54,9 +56,11 @@ def lunar_lander_display(seed: int | None = None) -> Display:
     Raises:
         RequestError: if the seed is not a whole number, or negative.
     """
+    surface = _terrain(seed)
     return Display(
         width=_ACROSS, height=_UP, actions=ACTIONS, keys=_KEYS, rate=RATE, idle=0,
-        backdrop=[*_sky(), *_ground(_terrain(seed)), *_pad()], scene=_scene,
+        backdrop=[*_sky(), *_ground(surface), *_pad()],
+        scene=functools.partial(_scene, np.array(surface)),
     )  # fmt: skip
 
 
@@ -102,7 +106,7 @@ def _pad() -> list[Shape]:
     return shapes
 
 
-def _scene(observation: Any, step: Step | None) -> list[Shape]:
+def _scene(surface: np.ndarray, observation: Any, step: Step | None) -> list[Shape]:
     x, y = float(observation[0]), float(observation[1])
     centre = (x + 1) * _ACROSS / 2, y * _UP / 2 + _UP / 4 + LEG_DOWN * SCALE
     angle = float(observation[4])
@@ -117,7 +121,7 @@ def _scene(observation: Any, step: Step | None) -> list[Shape]:
         *(
             shape
             for side, place in ((-1, LEFT_LEG), (1, RIGHT_LEG))
-            for shape in _leg(placed, side, bool(observation[place]))
+            for shape in _leg(surface, placed, side, bool(observation[place]))
         ),
         polygon(placed([(-6, -9), (-9, -14), (9, -14), (6, -9)]), "#6b6f85", _EDGE, 1),
         polygon(placed(CORNERS), HULL, _EDGE, 1.5),
@@ -125,29 +129,45 @@ def _scene(observation: Any, step: Step | None) -> list[Shape]:
     ]
 
 
-def _leg(placed: Placed, side: int, touches: bool) -> list[Shape]:
+def _leg(surface: np.ndarray, placed: Placed, side: int, touches: bool) -> list[Shape]:
     """A leg with its strut and its foot, lit while it touches the ground.
 
+    The observation does not tell its angle: it is spread as far as the ground demands.
+
     Args:
+        surface: of the ground, [N, 2], in pixels.
         placed: puts points beside the hull.
         side: -1 or 1, as Gymnasium counts; -1 is the leg on the right.
         touches: whether it has contact.
     """
-    angle = -side * _LEG_ANGLE
-    hip = _beside((0, 0), (side * LEG_AWAY * SCALE, LEG_DOWN * SCALE), angle)
     across, along = LEG_HALF_WIDTH * SCALE, LEG_HALF_HEIGHT * SCALE
+    angle = _spread(surface, placed, side)
 
     def on_leg(*points: Point) -> list[tuple[float, float]]:
-        return placed([_beside((-hip[0], -hip[1]), point, angle) for point in points])
+        return placed([_beside_leg(side, angle, point) for point in points])
 
     box = [(-across, along), (across, along), (across, -along), (-across, -along)]
-    foot = [(-5, 1.5 - along), (5, 1.5 - along), (5, -1.5 - along), (-5, -1.5 - along)]
+    foot = [(-5, 3 - along), (5, 3 - along), (5, -along), (-5, -along)]
     strut = [*placed([(-side * 14, -6)]), *on_leg((0, 2))]
     return [
         line(strut, "#9a9fb5", 2),
         polygon(on_leg(*box), HULL, _EDGE, 0.8),
         polygon(on_leg(*foot), "#ffd24a" if touches else "#9a9fb5", _EDGE, 0.8),
     ]
+
+
+def _spread(surface: np.ndarray, placed: Placed, side: int) -> float:
+    """The angle of a leg to the hull, radians: the smallest that keeps its end above the ground."""
+    end = 0, -LEG_HALF_HEIGHT * SCALE
+    ends = np.array(placed(_beside_leg(side, angle, end) for angle in _LEG_ANGLES))
+    above = ends[:, 1] <= np.interp(ends[:, 0], surface[:, 0], surface[:, 1])
+    return _LEG_ANGLES[np.argmax(above) if above.any() else -1]
+
+
+def _beside_leg(side: int, angle: float, point: Point) -> tuple[float, float]:
+    """A point beside the middle of a leg as one beside the hull, from which the leg hangs."""
+    hip = side * LEG_AWAY * SCALE, LEG_DOWN * SCALE
+    return _beside((0, 0), (point[0] - hip[0], point[1] - hip[1]), -side * angle)
 
 
 def _flames(action: int) -> Sequence[tuple[Sequence[Point], str]]:
