@@ -135,3 +135,17 @@ def test_the_foot_that_touches_the_ground_is_lit(leg):
 def test_a_seed_that_is_no_seed_is_refused():
     with pytest.raises(RequestError, match="seed = -1"):
         lunar_lander_display(-1)
+
+
+def test_legs_spread_when_the_hull_comes_down_between_them():
+    observation = np.array([0, -0.04, 0, 0, 0, 0, 1, 1], np.float32)  # as low as a hard landing
+    high = observation + np.array([0, 0.5, 0, 0, 0, 0, 0, 0], np.float32)
+    low, free = (near(ours(None, seen), "#ffd24a", 20) for seen in (observation, high))
+    assert np.nonzero(low)[0].max() <= 301 + 2  # the surface of the pad
+    assert width(low) > width(free) + 2
+
+
+def width(mask: np.ndarray) -> int:
+    """Columns from the first to the last of a mask."""
+    columns = np.nonzero(mask)[1]
+    return int(columns.max() - columns.min())
