@@ -109,8 +109,8 @@ def check_values(
         before_crash (steps until that episode crashed, 1 for the step that did; null if it did
         not), distance (of the observation from the nearest one of greedy episodes, in standard
         deviations of visited observations), at_random (whether the state was picked so), value
-        (claimed) and achieved (null if truncation hides it). In each episode four states at random and those of
-        `BEFORE_CRASH`, in greedy ones all.
+        (claimed) and achieved (null if truncation hides it). In each episode four states at random
+        and those of `BEFORE_CRASH`, in greedy ones all.
 
     Raises:
         RequestError: if a number is out of range, or values or observations are wrong.
