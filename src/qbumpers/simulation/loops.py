@@ -24,7 +24,7 @@ from qbumpers.decisions import (
     step_of,
 )
 from qbumpers.learners.dispatch import begin as begin_learner
-from qbumpers.learners.dispatch import choose, forget, learn, prefer
+from qbumpers.learners.dispatch import choose, forget, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
 from qbumpers.learners.interface import Shape
 from qbumpers.learners.motor import move
@@ -263,14 +263,6 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
 
 
 @inlined
-def _fresh_memory(forgetting: float | None, settings: Any, shape: Shape, stream: Any) -> Any:
-    """A learner's first memory once more, if anything is to be forgotten."""
-    if forgetting is None:
-        return 0
-    return start_learner(settings, shape, stream.copy())
-
-
-@inlined
 def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
     if forgetting is None:
         return
@@ -318,7 +310,7 @@ def run_trials(
     recorded = 0
     for trial in range(trials):
         _copy_streams(own, streams, trial, 0)
-        fresh = _fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
+        fresh = fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
         held = start_learner(learner.settings, shape, own_streams[LEARNER])
         memory = borrow(held)
         rule_memory = start_rule(assistance.options, model)
