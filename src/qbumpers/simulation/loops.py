@@ -264,6 +264,7 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
 
 @inlined
 def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
+    """Move a memory towards what it was at first, between two episodes."""
     if forgetting is None:
         return
     if episode > 0:
