@@ -351,7 +351,7 @@ def _compile_for(kind: str, decide: Any, start: Any, observe: Any, options_type:
     try:
         decided = result_type(decide, *arguments)
     except CompilationError as error:
-        if "unpack" in str(error):
+        if "wrong tuple length" in str(error) and f"got {len(Situation._fields)}" in str(error):
             raise RequestError(_BY_POSITION) from error
         raise
     if getattr(decided, "instance_class", None) is not Decision:
