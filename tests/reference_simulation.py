@@ -194,7 +194,7 @@ def perceived(perception, penalty):
 
 def learned_from(perception, proposed, executed, undone, reward, coin):
     """(action, reward, whether it seemed to lead back) taken from a step; None for nothing."""
-    notices, credits, penalty = perception
+    notices, credited, penalty = perception
     if proposed == executed and not undone:
         return proposed, reward, False
     if not coin < notices:  # it looks like the learner's own doing
@@ -203,7 +203,7 @@ def learned_from(perception, proposed, executed, undone, reward, coin):
         "executed": (executed, reward - penalty, False),
         "proposed": (proposed, reward - penalty, undone),
         "nothing": None,
-    }[credits]
+    }[credited]
 
 
 def draw_index(probabilities, generator):
@@ -233,8 +233,7 @@ class ReferenceTrial:
         self.draw_from(seeded_bit_generators(seed, condition.learning(), trial))
         self.perception = perceived(condition.perception, condition.penalty)
         self.own_values = [
-            [float(self.learner.initial_value)] * self.task.actions
-            for _ in range(self.task.states)
+            [float(self.learner.initial_value)] * self.task.actions for _ in range(self.task.states)
         ]
         self.ahead = None  # (state, action) that a learner of SARSA has chosen already
         self.episodes, self.steps = [], []

@@ -77,10 +77,13 @@ def _fade(table: np.ndarray, origin: np.ndarray, share: float) -> None:
             table[state, action] += share * (origin[state, action] - table[state, action])
 
 
+# What the overloads below return is the Python source of the learner's function: compiled into the
+# caller, without a layer of its own that would be linked and optimised once more.
+
+
 @overload(start, strict=False, jit_options=INLINE)
 def _compiled_start(settings: Any, shape: Any, stream: Any) -> Any:
-    function = learner_for_settings(settings.instance_class).start
-    return lambda settings, shape, stream: function(settings, shape, stream)
+    return uncompiled(learner_for_settings(settings.instance_class).start)
 
 
 @overload(fresh_memory, strict=False, jit_options=INLINE)
@@ -94,38 +97,27 @@ def _compiled_fresh_memory(share: Any, settings: Any, shape: Any, stream: Any) -
 @overload(begin, strict=False, jit_options=INLINE)
 def _compiled_begin(settings: Any, memory: Any, episode: Any, episodes: Any) -> Any:
     function = learner_for_settings(settings.instance_class).begin
-    if function is None:
-        return lambda settings, memory, episode, episodes: 0
-    called: Any = function
-    return lambda settings, memory, episode, episodes: called(settings, memory, episode, episodes)
+    return uncompiled(function) if function else lambda settings, memory, episode, episodes: 0
 
 
 @overload(choose, strict=False, jit_options=INLINE)
 def _compiled_choose(settings: Any, memory: Any, state: Any, rates: Any, stream: Any) -> Any:
-    function = learner_for_settings(settings.instance_class).choose
-    return lambda settings, memory, state, rates, stream: function(
-        settings, memory, state, rates, stream
-    )
+    return uncompiled(learner_for_settings(settings.instance_class).choose)
 
 
 @overload(prefer, strict=False, jit_options=INLINE)
 def _compiled_prefer(settings: Any, memory: Any, state: Any, tie: Any) -> Any:
-    function = learner_for_settings(settings.instance_class).prefer
-    return lambda settings, memory, state, tie: function(settings, memory, state, tie)
+    return uncompiled(learner_for_settings(settings.instance_class).prefer)
 
 
 @overload(policy, strict=False, jit_options=INLINE)
 def _compiled_policy(settings: Any, memory: Any, state: Any, rates: Any, out: Any) -> Any:
-    function = learner_for_settings(settings.instance_class).policy
-    return lambda settings, memory, state, rates, out: function(settings, memory, state, rates, out)
+    return uncompiled(learner_for_settings(settings.instance_class).policy)
 
 
 @overload(learn, strict=False, jit_options=INLINE)
 def _compiled_learn(settings: Any, memory: Any, transition: Any, rates: Any, stream: Any) -> Any:
-    function = learner_for_settings(settings.instance_class).learn
-    return lambda settings, memory, transition, rates, stream: function(
-        settings, memory, transition, rates, stream
-    )
+    return uncompiled(learner_for_settings(settings.instance_class).learn)
 
 
 @overload(forget, strict=False, jit_options=INLINE)
