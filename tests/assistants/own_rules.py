@@ -40,7 +40,7 @@ class BudgetOptions(NamedTuple):
     budget: Annotated[int, Field(ge=0)]
 
 
-def full_budget(options):
+def full_budget(options, model):
     return options.budget
 
 
