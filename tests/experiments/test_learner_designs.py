@@ -12,6 +12,8 @@ from tests.experiments.examples import cart, settings, write_toml
 from tests.values.networks import network_of
 
 DEEP, TABULAR = design_class("double-dqn"), design_class("q-learning")
+# The experts of these experiments are random networks.
+pytestmark = pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning")
 
 EVERYTHING = {
     "name": "double-dqn",

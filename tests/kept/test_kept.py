@@ -10,8 +10,9 @@ from qbumpers.analysis.measures import trial_measures
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import make_experiment, reproduction
+from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.store import load, run_description
+from qbumpers.reproduction.experiments import reproduction
 from tests.experiments.examples import contents_of
 from tests.kept.measuring import (
     HERE,

@@ -13,6 +13,7 @@ def test_cliff_walking_is_there_by_name():
     assert make_task("cliff-walking").digest() == cliff_walking().digest()
 
 
+@pytest.mark.usefixtures("own_tasks")
 def test_a_registered_task_is_made_by_its_name():
     task = random_task(0, 3, 2)
     register_task("a-task-of-the-tests", lambda: task)
@@ -68,6 +69,7 @@ def test_an_environment_of_neither_kind_is_refused():
         make_task("Blackjack-v1", discount=0.9)
 
 
+@pytest.mark.usefixtures("own_tasks")
 def test_a_registered_task_may_take_arguments():
     register_task("a-task-with-arguments", lambda states: random_task(0, states, 2))
     assert make_task("a-task-with-arguments", states=4).states == 4

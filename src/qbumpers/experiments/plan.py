@@ -2,16 +2,17 @@
 
 import dataclasses
 import time
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple, cast
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task, VectorTask
 from qbumpers.values import (
     NetworkValues,
     TabularValues,
@@ -25,7 +26,12 @@ _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
-SOURCES = ("exact", "q-learning", "expert")
+_SOURCES: dict[str, Callable[[Any], TabularValues | NetworkValues]] = {
+    "exact": solve,
+    "q-learning": learn_values,
+    "expert": lambda task: shipped_expert(task.name),
+}
+SOURCES = tuple(_SOURCES)
 """What `values` of an experiment may say in place of a path."""
 
 
@@ -58,6 +64,9 @@ def make_plan(experiment: Experiment) -> Plan:
 
     Raises:
         RequestError: where the task, values, a learner or an assistant is wrong.
+
+    Warns:
+        ExpertWarning: if the values of a network are no better than random play.
     """
     task = experiment.task.task()
     for learner in experiment.learners:
@@ -81,18 +90,16 @@ def make_plan(experiment: Experiment) -> Plan:
         content = content_digest([experiment.seed, condition.content()]).hex()
         named.append((each, content))
         conditions[content] = condition
+    if not task.states:
+        check_expert(cast(VectorTask, task), values)
     return Plan(experiment, task, values, named, conditions)
 
 
 def _values(source: str, task: Task) -> TabularValues | NetworkValues:
-    if isinstance(task, TabularTask):
-        made = {"exact": solve, "q-learning": learn_values}
-        if source in made:
-            return made[source](task)
-    elif source == "expert":
-        return shipped_expert(task.name)
+    if source in task.value_sources:
+        return _SOURCES[source](task)
     if source in SOURCES:
-        allowed = "'exact', 'q-learning'" if isinstance(task, TabularTask) else "'expert'"
+        allowed = ", ".join(map(repr, task.value_sources))
         raise RequestError(
             f"values = {source!r}; for task {task.name}, {allowed} or the path of a values file "
             "is needed"
@@ -121,7 +128,7 @@ def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     estimates = {}
     for cell in cells:
         condition = plan.conditions[cell.content]
-        tabular = isinstance(condition.task, TabularTask)
+        tabular = condition.task.states > 0
         alike = (condition.assistant.name, condition.learner_type.name)
         alike = alike if tabular else condition.learner
         if alike not in seconds:

@@ -15,7 +15,7 @@ from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
 from qbumpers.simulation import record
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task
 from qbumpers.tasks.dynamics import TERMINATED
 
 INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
@@ -88,19 +88,13 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
             minari.create_dataset_from_buffers(
                 dataset,
                 [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
-                observation_space=_observation_space(task),
+                observation_space=task.observation_space,
                 action_space=gymnasium.spaces.Discrete(task.actions),
                 algorithm_name=condition,
                 description=f"Simulated people at {task.name}, assisted by {condition}.",
             )
         except ValueError as error:
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
-
-
-def _observation_space(task: Task) -> gymnasium.Space[Any]:
-    if isinstance(task, TabularTask):
-        return gymnasium.spaces.Discrete(task.states)
-    return gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
 
 
 def _episodes(trial: int, steps: Step) -> Iterator[dict[str, Any]]:

@@ -9,7 +9,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.store import EPISODES, STATES, encoded
 from qbumpers.simulation import Condition, Simulation, StateCounts
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task
 from qbumpers.tasks.dynamics import CRASH, SUCCESS
 
 
@@ -40,7 +40,7 @@ def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
     """
     simulation = run_condition(condition, trials=range(cell.first, cell.end), seed=seed)
     tables = {EPISODES: episode_table(condition, cell, simulation)}
-    if isinstance(condition.task, TabularTask) and simulation.counts is not None:
+    if simulation.counts is not None:
         tables[STATES] = state_table(condition.task, simulation.counts)
     return Finished(cell, {kind: encoded(t) for kind, t in tables.items()}, simulation.steps)
 
@@ -84,23 +84,20 @@ def episode_table(condition: Condition, cell: Cell, simulation: Simulation) -> p
 
 
 def known_events(task: Task) -> dict[str, tuple[bool, int]]:
-    """Whether a task tells each kind of event, and the bit of it."""
-    if isinstance(task, TabularTask):
-        told = (task.success is not None, task.crash is not None)
-    else:
-        told = (task.has_success, task.has_crash)
-    return dict(zip(("success", "crash"), zip(told, (SUCCESS, CRASH), strict=True), strict=True))
+    """Whether a task announces each kind of event, and the bit of it."""
+    bits = {"success": SUCCESS, "crash": CRASH}
+    return {kind: (kind in task.events, bit) for kind, bit in bits.items()}
 
 
-def state_table(task: TabularTask, counts: StateCounts) -> pl.DataFrame:
+def state_table(task: Task, counts: StateCounts) -> pl.DataFrame:
     """A row a state of one cell: how often it was acted in.
 
     Args:
-        task: the task.
+        task: a task with a table.
         counts: how often, by state.
 
     Returns:
-        Columns state, row, column (null where the task is no grid), assisted, overridden and
+        Columns state, row, column (null if the task is no grid), assisted, overridden and
         unassisted, in steps of the episodes with an assistant and of the greedy ones after them.
     """
     columns = {"state": np.arange(task.states), **counts._asdict()}

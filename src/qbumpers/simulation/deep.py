@@ -36,10 +36,24 @@ def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     return Simulation(outcomes, None)
 
 
-def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more."""
+def record(
+    condition: Condition,
+    trials: range,
+    seed: int,
+    script: Script | None,
+    interpreted: bool = False,
+) -> Step:
+    """Every step of training of one trial; `qbumpers.simulation.record` says more.
+
+    Args:
+        condition: to simulate.
+        trials: the one trial.
+        seed: of the experiment.
+        script: to be played again; or None.
+        interpreted: whether to call the pieces of a step as plain Python, to be compared with.
+    """
     rows: list[Step] = []
-    _run_trials(condition, trials, seed, outcome_room(condition, 1), rows, script)
+    _run_trials(condition, trials, seed, outcome_room(condition, 1), rows, script, interpreted)
     kinds = Step(
         episode=np.int64, state=np.float32, proposed=np.int64, executed=np.int64, undone=np.bool_,
         credited=np.int64, overridden=np.bool_, probability=np.float64, coin=np.float64,
@@ -57,10 +71,11 @@ def _run_trials(
     outcomes: Outcomes,
     rows: list[Step] | None,
     script: Script | None,
+    interpreted: bool = False,
 ) -> None:
     each = streams(condition, trials, seed)
     for place, number in enumerate(trials):
-        trial = _Trial(condition, number, each[place], rows, script)
+        trial = _Trial(condition, number, each[place], rows, script, interpreted)
         for episode in range(condition.episodes + condition.retention):
             trial.run_episodes(episode, outcomes, place)
 
@@ -82,6 +97,7 @@ class _Trial:
         each: uint64 [1 or E, 4, 4], streams, of the whole trial or of each episode.
         rows: step records are appended; or None.
         script: played again; or None.
+        interpreted: whether the pieces of a step run as plain Python.
     """
 
     def __init__(
@@ -91,12 +107,14 @@ class _Trial:
         each: np.ndarray,
         rows: list[Step] | None,
         script: Script | None,
+        interpreted: bool,
     ) -> None:
         task = cast(VectorTask, condition.task)
         self._condition, self._task = condition, task
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
         self._rows, self._script, self._played = rows, script, 0
+        self._interpreted = interpreted
         shape = Shape(0, task.observation_size, (0,) * task.actions)
         self._memory = start_learner(condition.learner, shape, self._streams[LEARNER])
         self._settings, self._perception, self._motor, _ = compiled_learner(condition)
@@ -116,7 +134,7 @@ class _Trial:
         calls = (act, take, preferred)
         if not (assistant.built_in and learner.built_in):
             calls = tuple(_SESSION[each] for each in calls)
-        if not (assistant.compiled and learner.compiled):
+        if self._interpreted or not (assistant.compiled and learner.compiled):
             calls = tuple(map(uncompiled, calls))
         observation = np.zeros(self._task.observation_size, np.float32)
         learning = (self._settings, self._memory, self._rates)

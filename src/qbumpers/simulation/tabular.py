@@ -24,20 +24,36 @@ def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     return Simulation(outcomes, counts)
 
 
-def record(condition: Condition, trials: range, seed: int, script: Script | None) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more."""
+def record(
+    condition: Condition,
+    trials: range,
+    seed: int,
+    script: Script | None,
+    interpreted: bool = False,
+) -> Step:
+    """Every step of training of one trial; `qbumpers.simulation.record` says more.
+
+    Args:
+        condition: to simulate.
+        trials: the one trial.
+        seed: of the experiment.
+        script: to be played again; or None.
+        interpreted: whether to run the loops as plain Python, to be compared with.
+    """
     most = (condition.episodes + condition.retention) * condition.task.episode_limit
     steps = room_for_steps(most, np.zeros((), np.int64), condition.task.actions)
     sinks = Sinks(outcome_room(condition, 1), None, steps, script)
-    used = _call_loops(condition, trials, seed, sinks)
+    used = _call_loops(condition, trials, seed, sinks, interpreted)
     return Step(*(array[:used] for array in steps))
 
 
-def _call_loops(condition: Condition, trials: range, seed: int, sinks: Sinks) -> int:
+def _call_loops(
+    condition: Condition, trials: range, seed: int, sinks: Sinks, interpreted: bool = False
+) -> int:
     assistant, learner = condition.assistant, condition.learner_type
     built_in = assistant.built_in and learner.built_in
     loops: Any = run_trials if built_in else run_trials_for_session
-    if not (assistant.compiled and learner.compiled):
+    if interpreted or not (assistant.compiled and learner.compiled):
         loops = uncompiled(run_trials)
     task = condition.task
     seen = None if task.seen is None else np.ascontiguousarray(task.seen, np.int64)

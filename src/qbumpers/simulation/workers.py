@@ -17,7 +17,7 @@ from concurrent.futures import (
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
-from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks import Task
 
 Found = TypeVar("Found")
 
@@ -43,7 +43,7 @@ def make_pool(task: Task, workers: int) -> Iterator[Executor]:
         The pool, to be used with `submit` and `some_finished`. Where the block is left before all
         is done, nobody waits for the rest: processes are ended, threads go on unheeded.
     """
-    if isinstance(task, TabularTask):
+    if task.releases_gil:
         pool: Executor = ThreadPoolExecutor(workers)
     else:
         context = multiprocessing.get_context(_START)

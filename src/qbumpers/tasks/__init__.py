@@ -2,9 +2,11 @@
 
 from qbumpers.tasks.cliff_walking import CliffWalking, cliff_walking
 from qbumpers.tasks.environment import TabularEnvironment
-from qbumpers.tasks.registry import Task, make_task, register_task, task_names
+from qbumpers.tasks.registry import make_task, register_task, task_names
+from qbumpers.tasks.stepping import Stepper, UndoableStepper
 from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.task import Task
+from qbumpers.tasks.vector import VectorTask
 
 __all__ = [
     "CliffWalking",
@@ -12,6 +14,7 @@ __all__ = [
     "TabularEnvironment",
     "TabularTask",
     "Task",
+    "UndoableStepper",
     "VectorTask",
     "cliff_walking",
     "make_task",

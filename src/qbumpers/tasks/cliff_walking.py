@@ -71,8 +71,7 @@ class CliffWalking(TabularEnvironment):
     metadata = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(self, render_mode: str | None = None) -> None:
-        super().__init__(cliff_walking())
-        self.render_mode = render_mode
+        super().__init__(cliff_walking(), render_mode)
 
     def render(self) -> Any:
         """The current state: text for "ansi", uint8 [256, 768, 3] for "rgb_array"."""

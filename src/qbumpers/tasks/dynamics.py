@@ -3,12 +3,17 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import register_jitable
 
-from qbumpers.compilation import INLINE, compiled_apart
+from qbumpers.compilation import compiled_apart, inlined
 
 TERMINATED, SUCCESS, CRASH, TRUNCATED, LIMIT = 1, 2, 4, 8, 16
-"""Bits of the events of a step; TRUNCATED where an environment stops by itself, not at its end."""
+"""Bits of the events of a step.
+
+TRUNCATED if an environment stops by itself, not at its end; LIMIT if the step limit is reached.
+"""
+
+ENDS = TERMINATED | TRUNCATED | LIMIT
+"""The bits that tell the end of an episode."""
 
 
 class Dynamics(NamedTuple):
@@ -37,7 +42,7 @@ class Dynamics(NamedTuple):
     episode_limit: int
 
 
-@register_jitable(**INLINE)
+@inlined
 def sample(cumulative: np.ndarray, first: int, count: int, chance: float) -> int:
     """Index of the outcome that `chance` falls on.
 
@@ -56,7 +61,7 @@ def sample(cumulative: np.ndarray, first: int, count: int, chance: float) -> int
     return index
 
 
-@register_jitable(**INLINE)
+@inlined
 def first_state(dynamics: Dynamics, chance: float) -> int:
     """The state that an episode starts in; `chance` is uniform in [0, 1)."""
     return dynamics.start_states[
@@ -64,7 +69,7 @@ def first_state(dynamics: Dynamics, chance: float) -> int:
     ]
 
 
-@register_jitable(**INLINE)
+@inlined
 def transition(dynamics: Dynamics, state: int, action: int, chance: float) -> int:
     """Index of what follows an action; `chance` is uniform in [0, 1)."""
     first = (state * dynamics.actions + action) * dynamics.outcomes

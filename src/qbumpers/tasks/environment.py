@@ -7,21 +7,31 @@ from gymnasium import spaces
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, transition
-from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.task import Task
 
 
 class TabularEnvironment(gymnasium.Env[Any, Any]):
     """A tabular task to be stepped through; states and actions are numbers.
 
-    `info` of every step has `success` and `crash`, false where the task does not know them. The
-    step limit belongs to the registration (Gymnasium's TimeLimit), not to this class.
+    `info` of every step has `success` and `crash`, false if the task does not know them. The step
+    limit belongs to Gymnasium's TimeLimit (see `TabularTask.make_environment`), not to this class.
 
     Args:
-        task: the task.
+        task: a task with a table.
+        render_mode: one that its class has; None for no pictures.
+
+    Raises:
+        RequestError: if there is no such mode.
     """
 
-    def __init__(self, task: TabularTask) -> None:
+    metadata = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(self, task: Task, render_mode: str | None = None) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            known = ", ".join(self.metadata["render_modes"]) or "there are none"
+            raise RequestError(f"task {task.name}: render_mode = {render_mode!r}; known: {known}")
         self.task = task
+        self.render_mode = render_mode
         self.observation_space = spaces.Discrete(task.states)
         self.action_space = spaces.Discrete(task.actions)
         self._dynamics = task.dynamics()
@@ -52,3 +62,15 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         events = int(dynamics.events[index])
         info = {"success": bool(events & SUCCESS), "crash": bool(events & CRASH)}
         return self._state, float(dynamics.reward[index]), bool(events & TERMINATED), False, info
+
+    def snapshot(self) -> int:
+        """The number of the state."""
+        return self._state
+
+    def restore(self, snapshot: int) -> None:
+        """Put a state back; chance goes on, so that the same action may lead elsewhere.
+
+        Args:
+            snapshot: from `snapshot`.
+        """
+        self._state = snapshot

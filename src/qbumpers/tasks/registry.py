@@ -10,10 +10,10 @@ from gymnasium import spaces
 
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.tasks.cliff_walking import cliff_walking
+from qbumpers.tasks.stepping import make_environment
 from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import VectorTask, make_environment
-
-Task = TabularTask | VectorTask
+from qbumpers.tasks.task import Task
+from qbumpers.tasks.vector import VectorTask
 
 
 def _lunar_lander(seed: int | None = None) -> VectorTask:
@@ -53,15 +53,15 @@ def make_task(
             a transition table such as "FrozenLake-v1", or with numbered actions and a vector
             observation such as "CartPole-v1".
         discount: of a Gymnasium environment, which states none; in (0, 1].
-        episode_limit: of a Gymnasium environment, in steps; its own where None.
-        **arguments: of the task, for instance `seed=0` of "lunar-lander", or of the Gymnasium
-            environment, for instance `is_slippery=True`.
+        episode_limit: of a Gymnasium environment, in steps; its own if None.
+        **arguments: of the task, for example `seed=0` of "lunar-lander", or of the Gymnasium
+            environment, for example `is_slippery=True`.
 
     Returns:
-        The task, a TabularTask where there is a transition table.
+        The task, a TabularTask if there is a transition table.
 
     Raises:
-        RequestError: where no task or environment has the name, or an argument does not suit it.
+        RequestError: if no task or environment has the name, or an argument does not suit it.
     """
     if name in _tasks:
         numbers = {"discount": discount, "episode_limit": episode_limit}

@@ -1,26 +1,35 @@
 """Tasks with numbered states and actions and known transitions."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import gymnasium
 import numpy as np
+from gymnasium import spaces
+from gymnasium.wrappers import TimeLimit
 
-from qbumpers.errors import RequestError
+from qbumpers.tasks.checking import check_arrays, check_cells, check_common
+from qbumpers.tasks.construction import (
+    Judge,
+    Table,
+    description_of,
+    outcomes_of_arrays,
+    outcomes_of_table,
+    start_distribution,
+)
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
-
-_ROW_TOLERANCE = 1e-8
-
-Judge = Callable[[int, int, int, float, bool], bool]
-"""`(state, action, next_state, reward, terminated) -> bool`."""
+from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.task import distance_between
 
 
 @dataclass(frozen=True, eq=False)
 class TabularTask:
-    """A finite episodic Markov decision process (Section 2.1).
+    """A finite episodic Markov decision process (Section 2.1); it is a `Task`.
 
-    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0.
+    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0. The
+    last four fields are optional; `dataclasses.replace` adds them to a task from any source.
 
     Attributes:
         name: for messages and files.
@@ -32,13 +41,17 @@ class TabularTask:
         discount: in (0, 1].
         episode_limit: steps after which an episode is truncated; not a terminal state, learners
             bootstrap through it.
-        success: bool [S, A, K], outcomes that count as success; None where unknown.
-        crash: bool [S, A, K], outcomes that count as a crash; None where unknown.
-        grid: (rows, columns) where state = row * columns + column, for heatmaps; else None.
+        success: bool [S, A, K], outcomes that count as success; None if unknown.
+        crash: bool [S, A, K], outcomes that count as a crash; None if unknown.
+        grid: (rows, columns) if state = row * columns + column, for heatmaps; else None.
+        no_op: the action that does nothing; -1 if there is none.
+        action_distance: float [A, A], how far apart actions are; None if any two are alike.
+        seen: int [S], number of what the assistant sees of each state, if it is less than all.
+        make_display: makes `display` of the task; no part of its digest.
 
     Raises:
-        RequestError: where shapes disagree, a probability row does not sum to 1, a state number or
-            the discount is out of range, or a number is not finite.
+        RequestError: if shapes disagree, a probability row does not sum to 1, a state or action
+            number or the discount is out of range, or a number is not finite.
     """
 
     name: str
@@ -52,21 +65,22 @@ class TabularTask:
     success: np.ndarray | None = None
     crash: np.ndarray | None = None
     grid: tuple[int, int] | None = None
+    no_op: int = -1
+    action_distance: np.ndarray | None = None
+    seen: np.ndarray | None = None
+    make_display: Callable[["TabularTask"], Any] | None = None
+
+    observation_size = 0
+    undoable = True
+    releases_gil = True
+    learners = ("q-learning", "sarsa", "expected-sarsa")
+    value_sources = ("exact", "q-learning")
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check(self)
-
-    observation_size = 0
-    no_op = -1
-    has_distance = False
-    undoable = True
-    seen = None
-    learners = ("q-learning", "sarsa", "expected-sarsa")
-
-    @property
-    def distance(self):
-        return 1 - np.eye(self.actions)
+        check_arrays(self)
+        check_common(self, self.make_display)
+        check_cells(self)
 
     @property
     def states(self) -> int:
@@ -77,6 +91,32 @@ class TabularTask:
     def actions(self) -> int:
         """A."""
         return self.next_state.shape[1]
+
+    @property
+    def observation_space(self) -> spaces.Discrete:
+        """The numbers of its states."""
+        return spaces.Discrete(self.states)
+
+    @property
+    def events(self) -> frozenset[str]:
+        """Which of "success" and "crash" it announces."""
+        flags = {"success": self.success, "crash": self.crash}
+        return frozenset(name for name, array in flags.items() if array is not None)
+
+    @property
+    def has_distance(self) -> bool:
+        """Whether it states distances between its actions."""
+        return self.action_distance is not None
+
+    @property
+    def distance(self) -> np.ndarray:
+        """Between actions, float64 [A, A]; 1 between any two if none is stated."""
+        return distance_between(self.actions, self.action_distance)
+
+    @property
+    def display(self) -> Any:
+        """How it is shown and played; None if it does not say."""
+        return None if self.make_display is None else self.make_display(self)
 
     def dynamics(self) -> Dynamics:
         """The task laid out for compiled loops."""
@@ -101,7 +141,33 @@ class TabularTask:
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
-        return hashlib.sha256(b"|".join(parts)).hexdigest()
+        return hashlib.sha256(b"|".join([*parts, *self._optional_parts()])).hexdigest()
+
+    def _optional_parts(self) -> list[bytes]:
+        """What is part of the digest only if it is stated: digests of tasks without it stay."""
+        parts = []
+        if self.no_op >= 0:
+            parts.append(b"no_op" + np.int64(self.no_op).tobytes())
+        if self.has_distance:
+            parts.append(b"distance" + self.distance.tobytes())
+        if self.seen is not None:
+            parts.append(b"seen" + np.asarray(self.seen, np.int64).tobytes())
+        return parts
+
+    def make_environment(self, *, render_mode: str | None = None) -> gymnasium.Env[Any, Any]:
+        """The task as a Gymnasium environment with its step limit.
+
+        Args:
+            render_mode: one that `TabularEnvironment` has, or None for no pictures.
+
+        Returns:
+            A `TabularEnvironment` within Gymnasium's TimeLimit.
+
+        Raises:
+            RequestError: if there is no such mode.
+        """
+        environment = TabularEnvironment(self, render_mode)
+        return TimeLimit(environment, max_episode_steps=self.episode_limit)
 
     @classmethod
     def from_arrays(
@@ -122,7 +188,7 @@ class TabularTask:
 
         Args:
             transition: p(s' | s, a), float [S, A, S].
-            reward: float [S, A], or [S, A, S] where it depends on the next state.
+            reward: float [S, A], or [S, A, S] if it depends on the next state.
             terminal: bool [S], states that end the episode when entered.
             start: the first state, or float [S], its distribution.
             discount: in (0, 1].
@@ -130,7 +196,7 @@ class TabularTask:
             name: for messages and files.
             success: bool [S], states whose entry is a success.
             crash: bool [S], states whose entry is a crash.
-            grid: (rows, columns) where states are the cells of a grid, row by row.
+            grid: (rows, columns) if states are the cells of a grid, row by row.
 
         Returns:
             The task.
@@ -138,45 +204,16 @@ class TabularTask:
         Raises:
             RequestError: as the class does.
         """
-        transition = np.asarray(transition, np.float64)
-        if transition.ndim != 3 or transition.shape[0] != transition.shape[2]:
-            raise RequestError(f"transition has shape {transition.shape}; [S, A, S] is needed")
-        _check_rows("transition", transition)
-        states, actions, _ = transition.shape
-        outcomes = max(1, int((transition > 0).sum(axis=2).max()))
-        # Likely outcomes first: the others' probability is 0 and they are never drawn.
-        order = np.argsort(transition == 0, axis=2, kind="stable")[:, :, :outcomes]
-        full_reward = np.asarray(reward, np.float64)
-        if full_reward.shape == (states, actions):
-            full_reward = np.repeat(full_reward[:, :, None], states, axis=2)
-        if full_reward.shape != transition.shape:
-            raise RequestError(
-                f"reward has shape {full_reward.shape}; [S, A] or [S, A, S] of the transition's "
-                f"{transition.shape} is needed"
-            )
-        distribution = np.asarray(start, np.float64)
-        if np.ndim(start) == 0:
-            if start not in range(states):
-                raise RequestError(f"start = {start!r}; it must lie in [0, {states})")
-            distribution = np.eye(states)[int(np.asarray(start))]
+        outcomes: Any = outcomes_of_arrays(transition, reward, terminal, success, crash)
         return cls(
-            name=name,
-            next_state=order,
-            probability=np.take_along_axis(transition, order, 2),
-            reward=np.take_along_axis(full_reward, order, 2),
-            terminated=_state_flags("terminal", terminal, states)[order],
-            start=distribution,
-            discount=discount,
-            episode_limit=episode_limit,
-            success=None if success is None else _state_flags("success", success, states)[order],
-            crash=None if crash is None else _state_flags("crash", crash, states)[order],
-            grid=grid,
-        )
+            name=name, start=start_distribution(start, len(outcomes["next_state"])),
+            discount=discount, episode_limit=episode_limit, grid=grid, **outcomes,
+        )  # fmt: skip
 
     @classmethod
     def from_table(
         cls,
-        table: Mapping[int, Mapping[int, list[tuple[float, int, float, bool]]]],
+        table: Table,
         start: np.ndarray,
         *,
         discount: float,
@@ -194,10 +231,10 @@ class TabularTask:
             discount: in (0, 1].
             episode_limit: steps after which an episode is truncated.
             name: for messages and files.
-            success: which outcomes are a success. Without it, and where some ending pays a
-                positive reward, those endings are the successes and the other endings crashes.
+            success: which outcomes are a success. Without it and `crash`, and if some ending pays
+                a positive reward, those endings are the successes and the other endings crashes.
             crash: which outcomes are a crash.
-            grid: (rows, columns) where states are the cells of a grid, row by row.
+            grid: (rows, columns) if states are the cells of a grid, row by row.
 
         Returns:
             The task.
@@ -205,40 +242,11 @@ class TabularTask:
         Raises:
             RequestError: as the class does.
         """
-        states, actions = len(table), len(table.get(0, ()))
-        if any(set(table.get(s, ())) != set(range(actions)) for s in range(states)) or not actions:
-            raise RequestError(
-                "table must have states 0, 1, ... and in each the same actions 0, 1, ..."
-            )
-        outcomes = max(len(table[s][a]) for s in range(states) for a in range(actions))
-        shape = (states, actions, outcomes)
-        probability, next_state = np.zeros(shape), np.zeros(shape, np.int64)
-        reward, terminated = np.zeros(shape), np.zeros(shape, np.bool_)
-        judges = {"success": success, "crash": crash}
-        judged = {name: np.zeros(shape, np.bool_) for name in judges}
-        for s, a in np.ndindex(states, actions):
-            for k, (p, to, r, done) in enumerate(table[s][a]):
-                place = s, a, k
-                probability[place], next_state[place] = p, to
-                reward[place], terminated[place] = r, done
-                for event, judge in judges.items():
-                    judged[event][place] = judge is not None and p > 0 and judge(s, a, to, r, done)
-        events = {event: judged[event] if judge else None for event, judge in judges.items()}
-        if success is None and crash is None:
-            events = _endings(terminated, reward, probability)
+        outcomes: Any = outcomes_of_table(table, success, crash)
         return cls(
-            name=name,
-            next_state=next_state,
-            probability=probability,
-            reward=reward,
-            terminated=terminated,
-            start=np.asarray(start, np.float64),
-            discount=discount,
-            episode_limit=episode_limit,
-            success=events["success"],
-            crash=events["crash"],
-            grid=grid,
-        )
+            name=name, start=np.asarray(start, np.float64), discount=discount,
+            episode_limit=episode_limit, grid=grid, **outcomes,
+        )  # fmt: skip
 
     @classmethod
     def from_gymnasium(
@@ -253,9 +261,9 @@ class TabularTask:
         """A task from a Gymnasium environment that has a transition table `P`.
 
         Args:
-            environment: an environment, for instance `gymnasium.make("FrozenLake-v1")`.
+            environment: for example `gymnasium.make("FrozenLake-v1")`.
             discount: in (0, 1]; Gymnasium's environments state none.
-            episode_limit: steps; the environment's own limit where None.
+            episode_limit: steps; the environment's own limit if None.
             success: as for `from_table`.
             crash: as for `from_table`.
 
@@ -263,43 +271,10 @@ class TabularTask:
             The task.
 
         Raises:
-            RequestError: where the environment has no table, or no limit is known.
+            RequestError: if the environment has no table, or no limit is known.
         """
-        inner = environment.unwrapped
-        name = environment.spec.id if environment.spec else type(inner).__name__
-        table = getattr(inner, "P", None)
-        start = getattr(inner, "initial_state_distrib", None)
-        if table is None or start is None:
-            missing = "P" if table is None else "initial_state_distrib"
-            raise RequestError(
-                f"environment {name} has no attribute {missing}: a tabular task needs its "
-                "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
-            )
-        limit = episode_limit
-        if limit is None and environment.spec:
-            limit = environment.spec.max_episode_steps
-        if limit is None:
-            raise RequestError(f"environment {name} has no step limit: give episode_limit")
-        grid = np.shape(inner.desc) if np.ndim(getattr(inner, "desc", 0)) == 2 else None
-        if grid is not None and int(np.prod(grid)) != len(table):
-            grid = None
-        return cls.from_table(
-            table, start, discount=discount, episode_limit=limit, name=name,
-            success=success, crash=crash, grid=grid,
-        )  # fmt: skip
-
-
-def _endings(
-    terminated: np.ndarray, reward: np.ndarray, probability: np.ndarray
-) -> dict[str, np.ndarray | None]:
-    endings = terminated & (probability > 0)
-    paid = endings & (reward > 0)
-    # Absorbing states loop on themselves with reward 0; no episode gets there, they do not matter.
-    return (
-        {"success": paid, "crash": endings & ~paid}
-        if paid.any()
-        else {"success": None, "crash": None}
-    )
+        description = description_of(environment, episode_limit)
+        return cls.from_table(**description, discount=discount, success=success, crash=crash)
 
 
 def _cumulative(probability: np.ndarray) -> np.ndarray:
@@ -308,54 +283,3 @@ def _cumulative(probability: np.ndarray) -> np.ndarray:
     remaining = np.flip(np.cumsum(np.flip(probability, -1), axis=-1), -1)
     last = np.concatenate([remaining[..., 1:], np.zeros_like(remaining[..., :1])], axis=-1) == 0
     return np.where(last, 1.0, cumulative)
-
-
-def _state_flags(name: str, flags: np.ndarray, states: int) -> np.ndarray:
-    array = np.asarray(flags, np.bool_)
-    if array.shape != (states,):
-        raise RequestError(
-            f"{name} has shape {array.shape}; one flag a state, [{states}], is needed"
-        )
-    return array
-
-
-def _check_rows(name: str, probability: np.ndarray) -> None:
-    if not np.isfinite(probability).all() or (probability < 0).any():
-        raise RequestError(f"{name} holds a number that is no probability (negative or not finite)")
-    sums = probability.sum(axis=-1)
-    wrong = np.argwhere(np.abs(sums - 1) > _ROW_TOLERANCE)
-    if len(wrong):
-        where = ", ".join(str(i) for i in wrong[0])
-        labels = "state, action" if sums.ndim == 2 else "distribution"
-        place = f" for ({labels}) = ({where})" if sums.ndim else ""
-        raise RequestError(f"{name}{place} sums to {sums[tuple(wrong[0])]:g}; it must sum to 1")
-
-
-def _check(task: TabularTask) -> None:
-    shape = np.shape(task.next_state)
-    if len(shape) != 3 or 0 in shape:
-        raise RequestError(f"task {task.name}: next_state has shape {shape}; [S, A, K] is needed")
-    for field in ("probability", "reward", "terminated", "success", "crash"):
-        array = getattr(task, field)
-        if array is not None and np.shape(array) != shape:
-            raise RequestError(
-                f"task {task.name}: {field} has shape {np.shape(array)}; {shape} is needed"
-            )
-    if np.shape(task.start) != shape[:1]:
-        raise RequestError(
-            f"task {task.name}: start has shape {np.shape(task.start)}; {shape[:1]} is needed"
-        )
-    _check_rows(f"task {task.name}: probability", task.probability)
-    _check_rows(f"task {task.name}: start", task.start)
-    if not np.isfinite(task.reward).all():
-        raise RequestError(f"task {task.name}: reward holds a number that is not finite")
-    if task.next_state.min() < 0 or task.next_state.max() >= shape[0]:
-        raise RequestError(f"task {task.name}: next_state must lie in [0, {shape[0]})")
-    if not 0 < task.discount <= 1:
-        raise RequestError(f"task {task.name}: discount = {task.discount!r}; it must lie in (0, 1]")
-    if task.episode_limit < 1:
-        raise RequestError(
-            f"task {task.name}: episode_limit = {task.episode_limit!r}; at least 1 is needed"
-        )
-    if task.grid is not None and task.grid[0] * task.grid[1] != shape[0]:
-        raise RequestError(f"task {task.name}: grid {task.grid} does not hold {shape[0]} states")

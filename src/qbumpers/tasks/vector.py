@@ -1,10 +1,10 @@
-"""Tasks whose observations are vectors, stepped through one action at a time."""
+"""Tasks whose observations are vectors."""
 
 import functools
 from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -12,61 +12,42 @@ from gymnasium import spaces
 
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
-from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
-
-_SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
-
-
-class Stepper(Protocol):
-    """An environment as a simulator steps through it; the simulator keeps the step limit."""
-
-    def reset(self, chance: float) -> np.ndarray:
-        """Start an episode.
-
-        Args:
-            chance: in [0, 1), decides everything about the episode that is left to chance.
-
-        Returns:
-            The first observation, a new array, float32 [D].
-        """
-        ...
-
-    def step(self, action: int) -> tuple[np.ndarray, float, int]:
-        """Take an action.
-
-        Args:
-            action: in [0, A).
-
-        Returns:
-            The observation, a new array, float32 [D]; the reward; the events, bits TERMINATED,
-            SUCCESS, CRASH and TRUNCATED of `qbumpers.tasks.dynamics`.
-        """
-        ...
+from qbumpers.tasks.checking import check_common
+from qbumpers.tasks.dynamics import Dynamics
+from qbumpers.tasks.stepping import GymnasiumStepper, Stepper, make_environment
+from qbumpers.tasks.task import distance_between
+from qbumpers.tasks.undoing import can_undo
 
 
 @dataclass(frozen=True, eq=False)
 class VectorTask:
-    """An episodic task with A numbered actions, of which a vector of D numbers is observed.
+    """An episodic task of which a vector of D numbers is observed; it is a `Task`.
 
     It can be pickled, so that every worker makes its own environment.
 
     Attributes:
         name: for messages and files.
         make_stepper: makes the environment for simulators.
-        make_environment: makes it for people, as Gymnasium's environment with its step limit; takes
-            `render_mode`.
+        make_environment: makes it for participants, as Gymnasium's environment with its step limit;
+            takes `render_mode`.
         observation_size: D.
         actions: A.
         discount: in (0, 1].
         episode_limit: steps after which an episode is truncated; not a terminal state, learners
             bootstrap through it.
-        settings: JSON-like; all that decides how the environment behaves.
-        has_success: whether the environment tells successes.
-        has_crash: whether the environment tells crashes.
+        settings: JSON-like; all that decides how the environment behaves. What `no_op` and
+            `action_distance` say is part of the digest only if it is mentioned here: it usually
+            follows from the name.
+        has_success: whether the environment announces successes.
+        has_crash: whether the environment announces crashes.
+        undoable: whether its steppers have `snapshot` and `restore`, see `UndoableStepper`.
+        no_op: the action that does nothing; -1 if there is none.
+        action_distance: float [A, A], how far apart actions are; None if any two are alike.
+        make_display: makes `display` of the task; no part of its digest.
 
     Raises:
-        RequestError: where a size, the discount or the limit is out of range, or the settings are
-            not JSON-like.
+        RequestError: if a size, the discount, the limit, an action or a distance is out of range,
+            or the settings are not JSON-like.
     """
 
     name: str
@@ -79,18 +60,26 @@ class VectorTask:
     settings: Mapping[str, Any]
     has_success: bool
     has_crash: bool
+    undoable: bool = False
+    no_op: int = -1
+    action_distance: np.ndarray | None = None
+    make_display: Callable[["VectorTask"], Any] | None = None
+
+    states = 0
+    grid = None
+    seen = None
+    releases_gil = False
+    learners = ("double-dqn",)
+    value_sources = ("expert",)
 
     def __post_init__(self) -> None:
         """Check every number."""
-        if not 0 < self.discount <= 1:
-            raise RequestError(
-                f"task {self.name}: discount = {self.discount!r}; it must lie in (0, 1]"
-            )
-        for field in ("observation_size", "actions", "episode_limit"):
+        for field in ("observation_size", "actions"):
             if getattr(self, field) < 1:
                 raise RequestError(
                     f"task {self.name}: {field} = {getattr(self, field)!r}; at least 1 is needed"
                 )
+        check_common(self, self.make_display)
         try:
             self.digest()
         except (TypeError, ValueError) as error:
@@ -99,19 +88,47 @@ class VectorTask:
                 "and lists and tables of them can be kept with results"
             ) from error
 
-    states = 0
-    no_op = -1
-    has_distance = False
-    undoable = False
-    seen = None
-    learners = ("double-dqn",)
+    @property
+    def start(self) -> np.ndarray:
+        """Float64 [0]: no states are numbered."""
+        return np.zeros(0)
 
     @property
-    def distance(self):
-        return 1 - np.eye(self.actions)
+    def observation_space(self) -> spaces.Box:
+        """Every vector of D numbers."""
+        return spaces.Box(-np.inf, np.inf, (self.observation_size,), np.float32)
+
+    @property
+    def events(self) -> frozenset[str]:
+        """Which of "success" and "crash" it announces."""
+        announced = {"success": self.has_success, "crash": self.has_crash}
+        return frozenset(name for name, is_announced in announced.items() if is_announced)
+
+    @property
+    def has_distance(self) -> bool:
+        """Whether it states distances between its actions."""
+        return self.action_distance is not None
+
+    @property
+    def distance(self) -> np.ndarray:
+        """Between actions, float64 [A, A]; 1 between any two if none is stated."""
+        return distance_between(self.actions, self.action_distance)
+
+    @property
+    def display(self) -> Any:
+        """How it is shown and played; None if it does not say."""
+        return None if self.make_display is None else self.make_display(self)
+
+    def dynamics(self) -> Dynamics:
+        """Refused: it has no table of transitions.
+
+        Raises:
+            RequestError: always.
+        """
+        raise RequestError(f"task {self.name} has no table of transitions")
 
     def digest(self) -> str:
-        """A SHA-256 of everything that decides how the task behaves."""
+        """A SHA-256 of the name, the settings, the sizes, the discount and the limit."""
         content = {
             "name": self.name,
             "settings": self.settings,
@@ -128,25 +145,26 @@ class VectorTask:
     ) -> "VectorTask":
         """A task from a Gymnasium environment with numbered actions and a vector observation.
 
-        Every episode is seeded by itself. Successes and crashes are known where `info` has the keys
-        `success` and `crash` at reset or after the first step.
+        Every episode is seeded by itself. Successes and crashes are known if `info` has the keys
+        `success` and `crash` at reset or after the first step. Steps can be undone if `undo_of`
+        says so of the environment.
 
         Args:
-            name: id of the environment, for instance "CartPole-v1".
+            name: id of the environment, for example "CartPole-v1".
             discount: in (0, 1]; Gymnasium's environments state none.
-            episode_limit: steps; the environment's own limit where None.
+            episode_limit: steps; the environment's own limit if None.
             **arguments: of the environment, JSON-like.
 
         Returns:
             The task.
 
         Raises:
-            RequestError: where there is no such environment or it cannot be made, its actions are
+            RequestError: if there is no such environment or it cannot be made, its actions are
                 not Discrete or its observations not a vector, or no limit is known.
         """
         with closing(make_environment(name, **arguments)) as environment:
             _check_spaces(name, environment)
-            told = _told(environment)
+            announced, undoable = _announced(environment), can_undo(environment)
             limit = episode_limit
             if limit is None and environment.spec:
                 limit = environment.spec.max_episode_steps
@@ -163,29 +181,10 @@ class VectorTask:
             discount=discount,
             episode_limit=limit,
             settings={"environment": name, "arguments": arguments},
-            has_success="success" in told,
-            has_crash="crash" in told,
+            has_success="success" in announced,
+            has_crash="crash" in announced,
+            undoable=undoable,
         )
-
-
-def make_environment(name: str, **arguments: Any) -> Any:
-    """A Gymnasium environment.
-
-    Args:
-        name: its id.
-        **arguments: of `gymnasium.make`.
-
-    Returns:
-        The environment.
-
-    Raises:
-        RequestError: where there is none of this name or an argument does not suit it.
-    """
-    try:
-        return gymnasium.make(name, disable_env_checker=True, **arguments)
-    except (TypeError, ValueError, LookupError, gymnasium.error.Error, ImportError) as error:
-        missing = "; pip install 'qbumpers[lunar]'" if "Box2D" in str(error) else ""
-        raise RequestError(f"task {name!r}: {error}{missing}") from error
 
 
 def _check_spaces(name: str, environment: Any) -> None:
@@ -202,35 +201,8 @@ def _check_spaces(name: str, environment: Any) -> None:
         )
 
 
-def _told(environment: Any) -> set[str]:
+def _announced(environment: Any) -> set[str]:
     """Keys of `info` at reset and after a step."""
     _, first = environment.reset(seed=0)
     *_, info = environment.step(environment.action_space.start)
     return {*first, *info}
-
-
-class GymnasiumStepper:
-    """Any Gymnasium environment with numbered actions and a vector observation, for simulators.
-
-    Args:
-        name: id of the environment.
-        arguments: of the environment.
-    """
-
-    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
-        self._environment = make_environment(name, max_episode_steps=-1, **arguments)
-        self._first_action = int(self._environment.action_space.start)
-
-    def reset(self, chance: float) -> np.ndarray:
-        """As `Stepper.reset`; the chance becomes the seed of the episode."""
-        observation, _ = self._environment.reset(seed=int(chance * _SEEDS))
-        return np.array(observation, np.float32)
-
-    def step(self, action: int) -> tuple[np.ndarray, float, int]:
-        """As `Stepper.step`."""
-        observation, reward, terminated, truncated, info = self._environment.step(
-            self._first_action + action
-        )
-        events = TERMINATED * bool(terminated) | TRUNCATED * bool(truncated)
-        events |= SUCCESS * bool(info.get("success")) | CRASH * bool(info.get("crash"))
-        return np.array(observation, np.float32), float(reward), events

@@ -1,6 +1,7 @@
 """Exact Q* of a tabular task by dynamic programming."""
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -22,27 +23,28 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
 
     Args:
         task: the task.
-        discount: of the values, in (0, 1]; the task's where None.
+        discount: of the values, in (0, 1]; the task's if None.
 
     Returns:
         The values. Undiscounted, unreachable states without a proper policy have value 0.
 
     Raises:
-        RequestError: where the task has no table of transitions, the discount is out of range, or
+        RequestError: if the task has no table of transitions, the discount is out of range, or
             is 1 and a reachable state has no proper policy, or values grow without bound.
     """
-    if not isinstance(task, TabularTask):
+    if "exact" not in task.value_sources:
         raise RequestError(
             f"task {task.name} has no table of transitions to be solved: its values are learned, "
             "see train_expert"
         )
+    tabular = cast(TabularTask, task)
     discount = task.discount if discount is None else discount
     if not 0 < discount <= 1:
         raise RequestError(f"discount = {discount!r}; it must lie in (0, 1]")
     table = (
-        _policy_iteration(task, np.zeros(task.states, np.int64), discount)
+        _policy_iteration(tabular, np.zeros(task.states, np.int64), discount)
         if discount < 1
-        else _undiscounted(task)
+        else _undiscounted(tabular)
     )
     return TabularValues(
         table=np.round(table, DECIMALS) + 0.0,  # + 0.0 turns -0.0 into 0.0

@@ -1,1 +1,1 @@
-"""Lunar Lander: its bodies, the stepper of simulators, and the environment for people."""
+"""Lunar Lander: its bodies, the stepper of simulators, and the environment for participants."""

@@ -17,7 +17,7 @@ except ImportError as error:
         "the lunar lander needs Box2D, which is not installed: pip install 'qbumpers[lunar]'"
     ) from error
 
-SCALE = 30.0  # pixels a metre
+SCALE = 30.0  # pixels per metre
 WIDTH, HEIGHT = 600 / SCALE, 400 / SCALE  # metres
 GRAVITY = -10.0
 LEG_DOWN = 18 / SCALE
@@ -33,7 +33,7 @@ LEFT_LEG, RIGHT_LEG, CRASHED = 6, 7, 9
 _CORNERS = [(-14, 17), (-17, 0), (-17, -10), (17, -10), (17, 0), (14, 17)]
 _LEG_AWAY, _LEG_HALF_WIDTH, _LEG_HALF_HEIGHT, _LEG_TORQUE = 20 / SCALE, 2 / SCALE, 8 / SCALE, 40
 _CHUNKS = 11
-_HULL = 2  # tells it from the legs, 0 and 1
+_HULL = 2  # distinct from the legs, 0 and 1
 
 # Words of Box2D 2.3's b2Body, four bytes each: type, flags and island come first, then position,
 # sine and cosine, and a sweep of local centre, two centres, two angles and a fraction.
@@ -104,7 +104,7 @@ def build(ground: list[Any], force: tuple[float, float], contacts: Contacts) -> 
     Args:
         ground: from `ground_of`.
         force: newtons, during the first step.
-        contacts: told of contacts; must live as long as the world.
+        contacts: hears of contacts; must live as long as the world.
 
     Returns:
         The b2World and the b2Body of the hull, which lives as long as the world.

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import gymnasium
 import numpy as np
 
-# First, for its message where Box2D is missing.
+# First, for its message if Box2D is missing.
 from qbumpers.tasks.lunar_lander.stepper import chance_of
 
 from gymnasium.envs.box2d import lunar_lander as original  # isort: skip
@@ -24,12 +24,13 @@ class LunarLander(original.LunarLander):
         render_mode: "human", "rgb_array" or None.
 
     Raises:
-        RequestError: where the seed is not a whole number, or negative.
+        RequestError: if the seed is not a whole number, or negative.
     """
 
     def __init__(self, seed: int | None = None, render_mode: str | None = None) -> None:
         self._terrain_seed = seed
         self._chance = chance_of(seed)
+        self._actions: list[int] = []
         super().__init__(render_mode=render_mode)
 
     def reset(
@@ -49,15 +50,36 @@ class LunarLander(original.LunarLander):
         self._chance = chance_of(self._terrain_seed)
         with self._drawing_from_chance():
             observation, _ = super().reset(options=options)
+        self._actions = []  # without the one that Gymnasium's class begins with
         return observation, {"success": False, "crash": False}
 
     def step(self, action: int) -> tuple[np.ndarray, float, bool, Literal[False], dict[str, Any]]:
         """Take an action: 0 nothing, 1 left engine, 2 main engine, 3 right engine."""
         with self._drawing_from_chance():
             observation, reward, terminated, truncated, _ = super().step(action)
+        self._actions.append(int(action))
         success = bool(terminated and reward > 0)
         info = {"success": success, "crash": bool(terminated and not success)}
         return observation, float(reward), terminated, truncated, info
+
+    def snapshot(self) -> tuple[int, ...]:
+        """The actions of the episode so far: all that its state comes from."""
+        return tuple(self._actions)
+
+    def restore(self, snapshot: tuple[int, ...]) -> None:
+        """Take the episode back to a snapshot, bit for bit, by taking its actions again.
+
+        Args:
+            snapshot: from `snapshot`.
+        """
+        # Nothing is drawn meanwhile; the smoke of earlier steps, which changes nothing, is gone.
+        shown, self.render_mode = self.render_mode, None
+        try:
+            self.reset()
+            for action in snapshot:
+                self.step(action)
+        finally:
+            self.render_mode = shown
 
     @contextmanager
     def _drawing_from_chance(self) -> Iterator[None]:

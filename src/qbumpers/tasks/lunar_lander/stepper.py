@@ -42,7 +42,7 @@ DISCOUNT = 0.99
 EPISODE_LIMIT = 1000
 
 _PAPER_SEED = [547404849, 309914516]
-_STEPS_A_SECOND = 50
+_STEPS_PER_SECOND = 50
 _VELOCITY_ITERATIONS, _POSITION_ITERATIONS = 180, 60
 _FORCE = 1000.0  # newtons
 _DRAWN = 1024  # pairs of dispersions at a time
@@ -52,6 +52,9 @@ _MAIN_FUEL, _SIDE_FUEL = 0.30, 0.03
 _SHAPING = 8  # place in the state, after the observation
 _STATE_SIZE = 10
 _NOTHING, _LEFT, _MAIN, _RIGHT = range(ACTIONS)
+
+_ENGINES = np.eye(ACTIONS)[:, 1:]  # [action, engine], whether it burns
+_ENGINES_THAT_DIFFER = np.abs(_ENGINES[:, None] - _ENGINES).sum(axis=2)
 
 
 def chance_of(seed: int | None) -> np.random.Generator:
@@ -65,7 +68,7 @@ def chance_of(seed: int | None) -> np.random.Generator:
         A generator at the beginning of an episode.
 
     Raises:
-        RequestError: where the seed is not a whole number, or negative.
+        RequestError: if the seed is not a whole number, or negative.
     """
     if seed is None:
         bits = np.random.MT19937()
@@ -88,7 +91,7 @@ class Lander:
         seed: of Gymnasium's class, or None for the paper's terrain and noise.
 
     Raises:
-        RequestError: where the seed is not a whole number, or negative.
+        RequestError: if the seed is not a whole number, or negative.
     """
 
     def __init__(self, seed: int | None = None) -> None:
@@ -114,7 +117,7 @@ class Lander:
         self._contacts = Contacts(self._state)
         self._world, self._hull = build(self._ground, self._force, self._contacts)
         self._motion = motion_of(self._hull)
-        self._steps = 0
+        self._actions: list[int] = []
         return self.step(_NOTHING)[0]
 
     def step(self, action: int) -> tuple[np.ndarray, float, int]:
@@ -127,24 +130,42 @@ class Lander:
             A new observation, float32 [8]; the reward; bits TERMINATED, SUCCESS and CRASH.
 
         Raises:
-            RequestError: where there is no such action.
+            RequestError: if there is no such action.
         """
         if not 0 <= action < ACTIONS:
             raise RequestError(f"action = {action!r}; it must lie in [0, {ACTIONS})")
-        if self._steps == len(self._dispersions):
+        number = len(self._actions)
+        if number == len(self._dispersions):
             self._draw_ahead()
         if action != _NOTHING:
             sideways, upwards, at_x, at_y = _impulse(
-                self._motion(), self._dispersions, self._steps, action
+                self._motion(), self._dispersions, number, action
             )
             self._hull.ApplyLinearImpulse((sideways, upwards), (at_x, at_y), True)
-        self._steps += 1
-        self._world.Step(1.0 / _STEPS_A_SECOND, _VELOCITY_ITERATIONS, _POSITION_ITERATIONS)
+        self._actions.append(action)
+        self._world.Step(1.0 / _STEPS_PER_SECOND, _VELOCITY_ITERATIONS, _POSITION_ITERATIONS)
         observation = np.empty(OBSERVATION_SIZE, np.float32)
         reward, events = _outcome(
             self._motion(), self._state, observation, action, self._hull.awake
         )
         return observation, reward, events
+
+    def snapshot(self) -> tuple[int, ...]:
+        """The actions of the episode so far: all that its state comes from."""
+        return tuple(self._actions[1:])  # the first one is of `reset`
+
+    def restore(self, snapshot: tuple[int, ...]) -> None:
+        """Take the episode back to a snapshot, bit for bit.
+
+        Its actions are taken again: Box2D keeps more of bodies than it lets anyone write, so that
+        bodies that were put back would move differently.
+
+        Args:
+            snapshot: from `snapshot`.
+        """
+        self.reset()
+        for action in snapshot:
+            self.step(action)
 
     def _draw_ahead(self) -> None:
         drawn = self._chance.uniform(-1.0, 1.0, size=(_DRAWN, 2)) / SCALE
@@ -162,7 +183,7 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         picture its crash.
 
     Raises:
-        RequestError: where the seed is not a whole number, or negative.
+        RequestError: if the seed is not a whole number, or negative.
     """
     chance_of(seed)
     return VectorTask(
@@ -176,6 +197,9 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         settings={"seed": seed},
         has_success=True,
         has_crash=True,
+        undoable=True,
+        no_op=_NOTHING,
+        action_distance=_ENGINES_THAT_DIFFER,
     )
 
 
@@ -208,10 +232,10 @@ def _outcome(
     """Reward and events of a step; fills the observation and remembers the shaping."""
     state[0] = (np.float64(motion[X]) - WIDTH / 2) / (WIDTH / 2)
     state[1] = (np.float64(motion[Y]) - (HEIGHT / 4 + LEG_DOWN)) / (HEIGHT / 2)
-    state[2] = np.float64(motion[VELOCITY_X]) * (WIDTH / 2) / _STEPS_A_SECOND
-    state[3] = np.float64(motion[VELOCITY_Y]) * (HEIGHT / 2) / _STEPS_A_SECOND
+    state[2] = np.float64(motion[VELOCITY_X]) * (WIDTH / 2) / _STEPS_PER_SECOND
+    state[3] = np.float64(motion[VELOCITY_Y]) * (HEIGHT / 2) / _STEPS_PER_SECOND
     state[4] = np.float64(motion[ANGLE])
-    state[5] = 20.0 * np.float64(motion[SPIN]) / _STEPS_A_SECOND
+    state[5] = 20.0 * np.float64(motion[SPIN]) / _STEPS_PER_SECOND
     for place in range(OBSERVATION_SIZE):
         observation[place] = state[place]
     shaping = (

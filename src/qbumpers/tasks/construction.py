@@ -1,0 +1,147 @@
+"""Tabular tasks from the forms in which they are usually written down."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from qbumpers.errors import RequestError
+from qbumpers.tasks.checking import check_rows
+
+Judge = Callable[[int, int, int, float, bool], bool]
+"""`(state, action, next_state, reward, terminated) -> bool`."""
+
+Table = Mapping[int, Mapping[int, list[tuple[float, int, float, bool]]]]
+"""`table[state][action]`, a list of (probability, next state, reward, terminated)."""
+
+
+def outcomes_of_arrays(
+    transition: np.ndarray,
+    reward: np.ndarray,
+    terminal: np.ndarray,
+    success: np.ndarray | None,
+    crash: np.ndarray | None,
+) -> dict[str, np.ndarray | None]:
+    """The outcomes [S, A, K] of each action; see `TabularTask.from_arrays`."""
+    transition = np.asarray(transition, np.float64)
+    if transition.ndim != 3 or transition.shape[0] != transition.shape[2]:
+        raise RequestError(f"transition has shape {transition.shape}; [S, A, S] is needed")
+    check_rows("transition", transition)
+    states, actions, _ = transition.shape
+    outcomes = max(1, int((transition > 0).sum(axis=2).max()))
+    # Possible outcomes first: the others' probability is 0 and they are never drawn.
+    order = np.argsort(transition == 0, axis=2, kind="stable")[:, :, :outcomes]
+    full_reward = np.asarray(reward, np.float64)
+    if full_reward.shape == (states, actions):
+        full_reward = np.repeat(full_reward[:, :, None], states, axis=2)
+    if full_reward.shape != transition.shape:
+        raise RequestError(
+            f"reward has shape {full_reward.shape}; [S, A] or [S, A, S] of the transition's "
+            f"{transition.shape} is needed"
+        )
+    return {
+        "next_state": order,
+        "probability": np.take_along_axis(transition, order, 2),
+        "reward": np.take_along_axis(full_reward, order, 2),
+        "terminated": _state_flags("terminal", terminal, states)[order],
+        "success": None if success is None else _state_flags("success", success, states)[order],
+        "crash": None if crash is None else _state_flags("crash", crash, states)[order],
+    }
+
+
+def start_distribution(start: np.ndarray | int, states: int) -> np.ndarray:
+    """Distribution of the first state, float64 [S], if it may be given as one state."""
+    if np.ndim(start):
+        return np.asarray(start, np.float64)
+    if start not in range(states):
+        raise RequestError(f"start = {start!r}; it must lie in [0, {states})")
+    return np.eye(states)[int(np.asarray(start))]
+
+
+def outcomes_of_table(
+    table: Table, success: Judge | None, crash: Judge | None
+) -> dict[str, np.ndarray | None]:
+    """The outcomes [S, A, K] of each action; see `TabularTask.from_table`."""
+    states, actions = len(table), len(table.get(0, ()))
+    if any(set(table.get(s, ())) != set(range(actions)) for s in range(states)) or not actions:
+        raise RequestError(
+            "table must have states 0, 1, ... and in each the same actions 0, 1, ..."
+        )
+    outcomes = max(len(table[s][a]) for s in range(states) for a in range(actions))
+    shape = (states, actions, outcomes)
+    probability, next_state = np.zeros(shape), np.zeros(shape, np.int64)
+    reward, terminated = np.zeros(shape), np.zeros(shape, np.bool_)
+    for s, a in np.ndindex(states, actions):
+        for k, row in enumerate(table[s][a]):
+            place = s, a, k
+            probability[place], next_state[place], reward[place], terminated[place] = row
+    if success is None and crash is None:
+        events = _endings(terminated, reward, probability)
+    else:
+        judges = {"success": success, "crash": crash}
+        events = {name: _judged(table, shape, judge) for name, judge in judges.items()}
+    return {
+        "next_state": next_state,
+        "probability": probability,
+        "reward": reward,
+        "terminated": terminated,
+        **events,
+    }
+
+
+def _judged(table: Table, shape: tuple[int, int, int], judge: Judge | None) -> np.ndarray | None:
+    """Which possible outcomes a judge says yes to, bool [S, A, K]."""
+    if judge is None:
+        return None
+    judged = np.zeros(shape, np.bool_)
+    for s, a in np.ndindex(*shape[:2]):
+        for k, (p, to, r, done) in enumerate(table[s][a]):
+            judged[s, a, k] = p > 0 and judge(s, a, to, r, done)
+    return judged
+
+
+def _endings(
+    terminated: np.ndarray, reward: np.ndarray, probability: np.ndarray
+) -> dict[str, np.ndarray | None]:
+    """If some ending pays: those that do are successes, and the others crashes."""
+    endings = terminated & (probability > 0)
+    paid = endings & (reward > 0)
+    # Absorbing states loop on themselves with reward 0; no episode gets there, they do not matter.
+    return (
+        {"success": paid, "crash": endings & ~paid}
+        if paid.any()
+        else {"success": None, "crash": None}
+    )
+
+
+def description_of(environment: Any, episode_limit: int | None) -> dict[str, Any]:
+    """What `TabularTask.from_table` takes, of a Gymnasium environment with a transition table."""
+    inner = environment.unwrapped
+    name = environment.spec.id if environment.spec else type(inner).__name__
+    table = getattr(inner, "P", None)
+    start = getattr(inner, "initial_state_distrib", None)
+    if table is None or start is None:
+        missing = "P" if table is None else "initial_state_distrib"
+        raise RequestError(
+            f"environment {name} has no attribute {missing}: a tabular task needs its "
+            "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
+        )
+    if episode_limit is None and environment.spec:
+        episode_limit = environment.spec.max_episode_steps
+    if episode_limit is None:
+        raise RequestError(f"environment {name} has no step limit: give episode_limit")
+    grid = np.shape(inner.desc) if np.ndim(getattr(inner, "desc", 0)) == 2 else None
+    if grid is not None and int(np.prod(grid)) != len(table):
+        grid = None
+    return {
+        "table": table, "start": start, "name": name, "episode_limit": episode_limit, "grid": grid,
+    }  # fmt: skip
+
+
+def _state_flags(name: str, flags: np.ndarray, states: int) -> np.ndarray:
+    array = np.asarray(flags, np.bool_)
+    if array.shape != (states,):
+        raise RequestError(
+            f"{name} has shape {array.shape}; one flag per state, [{states}], is needed"
+        )
+    return array

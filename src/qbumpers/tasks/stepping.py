@@ -1,0 +1,113 @@
+"""Environments as simulators step through them, one action at a time."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+
+from qbumpers.errors import RequestError
+from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
+from qbumpers.tasks.undoing import undo_of
+
+_SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
+
+
+class Stepper(Protocol):
+    """An environment as a simulator steps through it; the simulator keeps the step limit."""
+
+    def reset(self, chance: float) -> np.ndarray:
+        """Start an episode.
+
+        Args:
+            chance: in [0, 1), decides everything about the episode that is left to chance.
+
+        Returns:
+            The first observation, a new array, float32 [D].
+        """
+        ...
+
+    def step(self, action: int) -> tuple[np.ndarray, float, int]:
+        """Take an action.
+
+        Args:
+            action: in [0, A).
+
+        Returns:
+            The observation, a new array, float32 [D]; the reward; the events, bits TERMINATED,
+            SUCCESS, CRASH and TRUNCATED of `qbumpers.tasks.dynamics`.
+        """
+        ...
+
+
+class UndoableStepper(Stepper, Protocol):
+    """A stepper whose steps can be taken back."""
+
+    def snapshot(self) -> Any:
+        """The state of the episode, unchanged by later steps."""
+        ...
+
+    def restore(self, snapshot: Any) -> None:
+        """Put the state of a snapshot back.
+
+        Args:
+            snapshot: of this episode.
+        """
+        ...
+
+
+class GymnasiumStepper:
+    """Any Gymnasium environment with numbered actions and a vector observation, for simulators.
+
+    `snapshot` and `restore` are those of the environment, and refused if it has none.
+
+    Args:
+        name: id of the environment.
+        arguments: of the environment.
+    """
+
+    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
+        self._environment = make_environment(name, max_episode_steps=-1, **arguments)
+        self._first_action = int(self._environment.action_space.start)
+
+    def reset(self, chance: float) -> np.ndarray:
+        """As `Stepper.reset`; the chance becomes the seed of the episode."""
+        observation, _ = self._environment.reset(seed=int(chance * _SEEDS))
+        return np.array(observation, np.float32)
+
+    def step(self, action: int) -> tuple[np.ndarray, float, int]:
+        """As `Stepper.step`."""
+        observation, reward, terminated, truncated, info = self._environment.step(
+            self._first_action + action
+        )
+        events = TERMINATED * bool(terminated) | TRUNCATED * bool(truncated)
+        events |= SUCCESS * bool(info.get("success")) | CRASH * bool(info.get("crash"))
+        return np.array(observation, np.float32), float(reward), events
+
+    def snapshot(self) -> Any:
+        """As `UndoableStepper.snapshot`."""
+        return undo_of(self._environment)[0]()
+
+    def restore(self, snapshot: Any) -> None:
+        """As `UndoableStepper.restore`."""
+        undo_of(self._environment)[1](snapshot)
+
+
+def make_environment(name: str, **arguments: Any) -> Any:
+    """A Gymnasium environment.
+
+    Args:
+        name: its id.
+        **arguments: of `gymnasium.make`.
+
+    Returns:
+        The environment.
+
+    Raises:
+        RequestError: if there is none of this name or an argument does not suit it.
+    """
+    try:
+        return gymnasium.make(name, disable_env_checker=True, **arguments)
+    except (TypeError, ValueError, LookupError, gymnasium.error.Error, ImportError) as error:
+        missing = "; pip install 'qbumpers[lunar]'" if "Box2D" in str(error) else ""
+        raise RequestError(f"task {name!r}: {error}{missing}") from error

@@ -1,0 +1,131 @@
+"""What every task says about itself: hosts ask the task, never what kind of task it is."""
+
+from typing import Any, Protocol
+
+import gymnasium
+import numpy as np
+
+from qbumpers.tasks.dynamics import Dynamics
+
+
+class Task(Protocol):
+    """An episodic task with A numbered actions.
+
+    Its states are numbered (a table, S states) or observed as vectors (of D numbers).
+    """
+
+    @property
+    def name(self) -> str:
+        """For messages and files."""
+        ...
+
+    @property
+    def actions(self) -> int:
+        """A."""
+        ...
+
+    @property
+    def discount(self) -> float:
+        """In (0, 1]."""
+        ...
+
+    @property
+    def episode_limit(self) -> int:
+        """Steps after which an episode is truncated."""
+        ...
+
+    @property
+    def states(self) -> int:
+        """S; 0 if observations are vectors."""
+        ...
+
+    @property
+    def observation_size(self) -> int:
+        """D; 0 if states are numbered."""
+        ...
+
+    @property
+    def observation_space(self) -> gymnasium.Space[Any]:
+        """Discrete(S), or Box of float32 [D]."""
+        ...
+
+    @property
+    def grid(self) -> tuple[int, int] | None:
+        """(rows, columns) if states are the cells of a grid, row by row; else None."""
+        ...
+
+    @property
+    def start(self) -> np.ndarray:
+        """Distribution of the first state, float [S]."""
+        ...
+
+    @property
+    def seen(self) -> np.ndarray | None:
+        """Number of what the assistant sees of each state, int [S]; None if it sees all of it."""
+        ...
+
+    @property
+    def events(self) -> frozenset[str]:
+        """Which of "success" and "crash" the task announces."""
+        ...
+
+    @property
+    def no_op(self) -> int:
+        """The action that does nothing; -1 if there is none."""
+        ...
+
+    @property
+    def has_distance(self) -> bool:
+        """Whether the task states distances between its actions."""
+        ...
+
+    @property
+    def distance(self) -> np.ndarray:
+        """Between actions, float64 [A, A]; 0 on the diagonal and 1 elsewhere if none is stated."""
+        ...
+
+    @property
+    def undoable(self) -> bool:
+        """Whether a step can be taken back."""
+        ...
+
+    @property
+    def display(self) -> Any:
+        """How the task is shown and played; None if it does not say."""
+        ...
+
+    @property
+    def learners(self) -> tuple[str, ...]:
+        """Names of the learners that suit it; the first is the default."""
+        ...
+
+    @property
+    def value_sources(self) -> tuple[str, ...]:
+        """Names of the sources that Q* of it can come from."""
+        ...
+
+    @property
+    def releases_gil(self) -> bool:
+        """Whether simulations of it run in threads at once: none of it is Python."""
+        ...
+
+    def digest(self) -> str:
+        """A SHA-256 of everything that decides how the task behaves."""
+        ...
+
+    def dynamics(self) -> Dynamics:
+        """Its transitions, laid out for compiled loops.
+
+        Raises:
+            RequestError: if observations are vectors.
+        """
+        ...
+
+    def make_environment(self, *, render_mode: str | None = None) -> gymnasium.Env[Any, Any]:
+        """The task as a Gymnasium environment that truncates episodes at the step limit."""
+        ...
+
+
+def distance_between(actions: int, stated: np.ndarray | None) -> np.ndarray:
+    """Distances between actions, float64 [A, A]: as stated, or 1 between any two."""
+    return 1 - np.eye(actions) if stated is None else np.asarray(stated, np.float64)
