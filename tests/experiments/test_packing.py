@@ -64,9 +64,7 @@ def test_another_process_without_the_module_of_a_rule_computes_the_same_bytes(
     with pytest.warns(UserWarning, match="cannot be compiled"):
         register_assistant("kind", rules.Options)(rules.kind)
     plan = plan_of({"name": "none"}, {"name": "kind", "kindness": [0.2, 0.9]})
-    (tmp_path / "packed").write_bytes(
-        pickle.dumps((packed(plan.conditions), plan.experiment.seed))
-    )
+    (tmp_path / "packed").write_bytes(pickle.dumps((packed(plan.conditions), plan.experiment.seed)))
     command = [sys.executable, "-c", ELSEWHERE, tmp_path / "packed", tmp_path / "done"]
     subprocess.run(command, check=True, cwd=tmp_path)
     done = pickle.loads((tmp_path / "done").read_bytes())

@@ -51,7 +51,7 @@ def continued(folder, experiment):
     """How many trials were there, and how many there are in all, of an experiment that goes on."""
     reports = []
     plan = make_plan(experiment)
-    run_experiment(plan, folder, executor=ThisMachine(1), report=reports.append)
+    run_experiment(plan, folder, backend=ThisMachine(1), report=reports.append)
     assert reports[0].damaged == []
     return reports[0].trials, reports[-1].trials
 
@@ -99,7 +99,7 @@ def test_learners_of_lunar_lander_at_full_length_stay_as_published(tmp_path):
     chosen = [{"name": "none"}, {"name": "maximal"}, {"name": "stochastic-q-bumpers", "alpha": 1.0}]
     options = {each["name"]: each for each in whole["assistants"]}
     whole["assistants"] = [{**options[each["name"]], **each} for each in chosen]
-    run_experiment(make_plan(make_experiment(whole)), tmp_path / "out", executor=ThisMachine(2))
+    run_experiment(make_plan(make_experiment(whole)), tmp_path / "out", backend=ThisMachine(2))
     results = load(tmp_path / "out")
     trials = trial_measures(results.episodes, results.experiment.criterion)
     write_numbers(tmp_path / "trials.csv", trials)
