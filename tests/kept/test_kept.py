@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from qbumpers.analysis.keeping import read_trials, write_numbers
+from qbumpers.analysis.archive import read_trials, write_rounded
 from qbumpers.analysis.measures import trial_measures
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
@@ -102,7 +102,7 @@ def test_learners_of_lunar_lander_at_full_length_stay_as_published(tmp_path):
     run_experiment(make_plan(make_experiment(whole)), tmp_path / "out", backend=ThisMachine(2))
     results = load(tmp_path / "out")
     trials = trial_measures(results.episodes, results.experiment.criterion)
-    write_numbers(tmp_path / "trials.csv", trials)
+    write_rounded(tmp_path / "trials.csv", trials)
     found = {row["condition"]: row for row in read_trials(tmp_path / "trials.csv").to_dicts()}
     published = {
         row["condition"]: row for row in read_trials(PUBLISHED).to_dicts() if row["trial"] == 0

@@ -84,11 +84,22 @@ def _options_listed(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
         is_tuple = getattr(hints.get(option), "__origin__", None) is tuple
         if is_tuple and isinstance(value, list) and not any(isinstance(v, list) for v in value):
             listed[option] = [value]
-        elif option == "of" and isinstance(value, dict) and isinstance(value.get("name"), str):
-            inner = {field: each for field, each in value.items() if field != "name"}
-            tables = swept(_options_listed(value["name"], inner), f"assistant {value['name']}")
-            listed[option] = [{"name": value["name"], **table} for table in tables]
+        elif option == "of":
+            given = value if isinstance(value, list) else [value]
+            listed[option] = [one for each in given for one in _others(each)]
     return listed
+
+
+def _others(given: Any) -> list[Any]:
+    """The assistants that a rule is over: one for each combination of listed options of a table."""
+    if not (isinstance(given, dict) and isinstance(given.get("name"), str)):
+        return [given]
+    name = given["name"]
+    options = {field: each for field, each in given.items() if field != "name"}
+    return [
+        {"name": name, **table}
+        for table in swept(_options_listed(name, options), f"assistant {name}")
+    ]
 
 
 class NamedCondition(NamedTuple):
@@ -213,6 +224,7 @@ class Experiment(Model):
 
 def _all_learners(given: list[Any], task: Any) -> list[Any]:
     """Learners by name, with listed fields swept over."""
+    given = [_tables_listed(each) if isinstance(each, dict) else each for each in given]
     tables = [each for each in given if isinstance(each, dict)]
     many = sum(map(combinations, tables))
     if many > MANY_CELLS:
@@ -225,6 +237,20 @@ def _all_learners(given: list[Any], task: Any) -> list[Any]:
         for learner in given
         for each in (swept(learner, "learner") if isinstance(learner, dict) else [learner])
     ]
+
+
+def _tables_listed(learner: dict[str, Any]) -> dict[str, Any]:
+    """A learner whose perception and motor noise are swept over if something in them is."""
+    listed = dict(learner)
+    for field in learner.keys() & {"perception", "motor"}:
+        given = learner[field] if isinstance(learner[field], list) else [learner[field]]
+        found = [
+            table
+            for each in given
+            for table in (swept(each, f"learner: {field}") if isinstance(each, dict) else [each])
+        ]
+        listed[field] = found[0] if len(found) == 1 else found
+    return listed
 
 
 def learner_observes(name: Any) -> str:
