@@ -23,6 +23,7 @@ from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
 from tests.assistants import own_rules
 from tests.experiments.examples import cart, contents_of, settings
+from tests.learners.own_learners import register_averaging
 
 # Ray leaves sockets and files to the garbage collector, and starts threads before it forks.
 pytestmark = [
@@ -209,12 +210,14 @@ def test_a_cluster_without_cores_left_ends_the_run_and_the_next_goes_on(
 
 
 @pytest.mark.slow
-def test_own_rules_travel_errors_come_back_as_themselves_and_what_is_finished_stays(
+def test_own_rules_and_learners_travel_errors_come_back_as_themselves_and_what_is_finished_stays(
     tmp_path, monkeypatch, own_registry, small_cells
 ):
     with pytest.warns(UserWarning, match="cannot be compiled"):
         register_assistant("own", own_rules.NoOptions)(own_rules.guide_with_a_dictionary)
-    plan = plan_of(trials=4, assistants=[{"name": "own"}, {"name": "none"}])
+    register_averaging()
+    learners = [{"name": "averaging", "hopes": 1.0}]
+    plan = plan_of(trials=4, assistants=[{"name": "own"}, {"name": "none"}], learners=learners)
     expected = local_run(plan, tmp_path / "local")
     work = cluster._finish_batch
 

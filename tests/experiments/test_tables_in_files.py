@@ -1,14 +1,18 @@
-"""Perception and motor noise as tables, learners of several names, and rules over rules, in files."""
+"""In files: tables of perception and motor noise, several kinds of learners, rules over rules."""
+
+from typing import NamedTuple
 
 import polars as pl
 import pytest
 
+from qbumpers.assistants import register_assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.experiments.store import load
 from qbumpers.learners import Motor, Perception, Sarsa
+from tests.assistants.own_rules import watch
 from tests.experiments.examples import cells_of, ids_of, run_into, settings
 
 NONE = [{"name": "none"}]
@@ -122,3 +126,19 @@ def test_a_rule_is_over_each_of_several_rules():
         'budget/of={name="stochastic-q-bumpers",alpha=0.2},per_episode=2',
         'budget/of={name="stochastic-q-bumpers",alpha=0.4},per_episode=2',
     ]
+
+
+class Limits(NamedTuple):
+    limits: tuple[float, ...] = (0.0, 1.0)
+
+
+def test_an_option_that_is_a_tuple_is_a_list_in_files_and_swept_over_as_a_list_of_lists(
+    own_registry, tmp_path
+):
+    register_assistant("watch", Limits)(watch)
+    one = make_experiment(settings(assistants=[{"name": "watch", "limits": [0.5, 2.0, 3.0]}]))
+    assert [named.assistant.options.limits for named in one.conditions()] == [(0.5, 2.0, 3.0)]
+    many = [{"name": "watch", "limits": [[0.5, 2.0], [1.0, 4.0]]}]
+    assert ids_of(assistants=many) == ["watch/limits=0.5-2", "watch/limits=1-4"]
+    folder = run_into(tmp_path, assistants=many, trials=1)
+    assert load(folder).experiment == make_experiment(settings(assistants=many, trials=1))
