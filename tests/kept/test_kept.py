@@ -28,7 +28,15 @@ PUBLISHED = HERE.parents[1] / "docs" / "data" / "lunar-lander" / "trials.csv"
 CELLS = "cells/**/*.parquet"
 
 
-@pytest.mark.parametrize("name", experiments())
+def each_experiment():
+    """Names; compiling deep learners of several shapes for several rules takes minutes."""
+    return [
+        pytest.param(name, marks=[] if experiment.tabular else pytest.mark.slow)
+        for name, experiment in experiments().items()
+    ]
+
+
+@pytest.mark.parametrize("name", each_experiment())
 def test_the_numbers_of_an_experiment_stay(name):
     experiment = experiments()[name]
     assert run_numbers(experiment) == KEPT[name]["episodes"]
