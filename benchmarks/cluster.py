@@ -13,7 +13,7 @@ from qbumpers.experiments.cells import Cell, tiles, trials_a_cell
 from qbumpers.experiments.cluster import BATCH_SECONDS, LOCAL, RayCluster
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
-from qbumpers.experiments.run import Executor, run_experiment
+from qbumpers.experiments.run import Backend, run_experiment
 from qbumpers.reproduction.experiments import reproduction
 
 _SMALL = 400  # cells of one trial
@@ -25,11 +25,11 @@ def small_cells(plan: Plan) -> list[Cell]:
     return [Cell(content, first, 1) for first in range(_SMALL)]
 
 
-def a_cell(executor: Executor, plan: Plan, alone: bool) -> Timed:
+def a_cell(backend: Backend, plan: Plan, alone: bool) -> Timed:
     """Milliseconds a small cell.
 
     Args:
-        executor: that does the work.
+        backend: that does the work.
         plan: the experiment.
         alone: whether each cell is handed over by itself; otherwise in batches as they come.
 
@@ -40,12 +40,12 @@ def a_cell(executor: Executor, plan: Plan, alone: bool) -> Timed:
     seconds = dict.fromkeys(small_cells(plan), each)
 
     def timed(_: int) -> float:
-        return seconds_of(lambda: list(executor(plan, seconds))) / _SMALL * 1e3
+        return seconds_of(lambda: list(backend(plan, seconds))) / _SMALL * 1e3
 
     return timed
 
 
-def a_sweep(executor: Executor, plan: Plan) -> Timed:
+def a_sweep(backend: Backend, plan: Plan) -> Timed:
     """Million steps a second of a whole run into a folder."""
 
     def timed(_: int) -> float:
@@ -53,7 +53,7 @@ def a_sweep(executor: Executor, plan: Plan) -> Timed:
         with tempfile.TemporaryDirectory() as folder:
             begin = time.perf_counter()
             run_experiment(
-                plan, folder, executor=executor, report=lambda done: steps.append(done.steps)
+                plan, folder, backend=backend, report=lambda done: steps.append(done.steps)
             )
             return steps[-1] / (time.perf_counter() - begin) / 1e6
 

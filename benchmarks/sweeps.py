@@ -13,7 +13,7 @@ from measuring import Row, Timed, alternate, compared, is_quick, seconds_of, sho
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
-from qbumpers.experiments.run import Executor, run_experiment
+from qbumpers.experiments.run import Backend, run_experiment
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import run
@@ -47,12 +47,12 @@ class Processes:
         self._pool.shutdown()
 
 
-def sweep(plan: Plan, executor: Executor, *, assembled: bool = True) -> Timed:
+def sweep(plan: Plan, backend: Backend, *, assembled: bool = True) -> Timed:
     """Million steps a second of a run into a fresh folder.
 
     Args:
         plan: the experiment.
-        executor: where it is run.
+        backend: where it is run.
         assembled: whether to time the whole call, with calibration before and tables of the whole
             experiment after; else from its first cell to the last that is kept.
     """
@@ -63,7 +63,7 @@ def sweep(plan: Plan, executor: Executor, *, assembled: bool = True) -> Timed:
             run_experiment(
                 plan,
                 Path(folder),
-                executor=executor,
+                backend=backend,
                 report=lambda progress: seen.append((time.perf_counter(), progress.steps)),
             )
             ended = time.perf_counter()

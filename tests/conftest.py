@@ -7,6 +7,7 @@ from hypothesis import settings
 
 from qbumpers import cli
 from qbumpers.assistants import registry
+from qbumpers.learners import registry as learners
 from tests.texts import plain
 
 # Compiled code is slow once, when it compiles; examples are the same in every run.
@@ -16,9 +17,11 @@ settings.load_profile("qbumpers")
 
 @pytest.fixture
 def own_registry(monkeypatch):
-    """Rules registered by a test are forgotten when it ends."""
+    """Rules and learners registered by a test are forgotten when it ends."""
     monkeypatch.setattr(registry, "_rules", dict(registry._rules))
     monkeypatch.setattr(registry, "_rules_by_options", dict(registry._rules_by_options))
+    for name in ("_learners", "_learners_by_settings"):
+        monkeypatch.setattr(learners, name, dict(getattr(learners, name)))
 
 
 @pytest.fixture

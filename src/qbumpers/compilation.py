@@ -151,6 +151,16 @@ def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return getattr(function, "py_func", function)
 
 
+def compilation_settings(function: Any) -> dict[str, Any] | None:
+    """The settings of Numba that a function was compiled with; None if it was not."""
+    return function.targetoptions if is_compiled(function) else None
+
+
+def compiled_with(function: F, settings: dict[str, Any]) -> F:
+    """Compile a function with settings from `compilation_settings`, nothing kept on disk."""
+    return numba.jit(**settings)(function)  # type: ignore[no-any-return]
+
+
 CompilationError = (NumbaError, TypeError)
 """What compiling a function raises that Numba cannot compile."""
 

@@ -35,13 +35,23 @@ def checked_class(kind: Any, where: str) -> type:
     return kind
 
 
-def fresh_class(kind: type) -> type:
+def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], Any]) -> type:
     """A class like `kind` that no other registration has.
 
     Numba tells NamedTuples apart by name, and what is registered again (an edited notebook cell)
-    must not meet its old code.
+    must not meet its old code. Instances are pickled by the name of what is registered.
+
+    Args:
+        kind: a NamedTuple class.
+        name: under which it is registered.
+        remade: an instance of the name and the values of the fields, called on unpickling.
     """
-    return type(f"{kind.__name__}_{next(_registrations)}", (kind,), {"__slots__": ()})
+
+    def reduce(instance: tuple[Any, ...]) -> Any:
+        return remade, (name, tuple(instance))
+
+    members = {"__slots__": (), "__reduce__": reduce}
+    return type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
 
 
 def compiled_or_plain(

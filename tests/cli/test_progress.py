@@ -3,7 +3,7 @@
 import pytest
 
 from qbumpers.cli.progress import Before, TrialProgress, rate, time_left
-from qbumpers.experiments.run import Progress
+from qbumpers.experiments.run import RunProgress
 
 
 def test_before_the_first_trial_it_is_the_expected_time():
@@ -45,7 +45,7 @@ def test_a_rate_is_told_in_the_unit_that_suits_it(steps, text):
 def test_the_bar_shows_trials_the_rate_and_the_time_left(capsys):
     announced = []
     with TrialProgress("simulating", announced.append) as bar:
-        first = Progress(trials=0, of=4, steps=0, expected=7200.0, damaged=[])
+        first = RunProgress(trials=0, of=4, steps=0, expected=7200.0, damaged=[])
         bar.show(first)
         bar.show(first._replace(trials=1, steps=500_000))
     assert announced == [first]

@@ -60,7 +60,7 @@ def settings(**changes):
 
 def run_into(folder, *, workers=1, report=lambda progress: None, **changes):
     plan = make_plan(make_experiment(settings(**changes)))
-    run_experiment(plan, folder, executor=ThisMachine(workers), report=report)
+    run_experiment(plan, folder, backend=ThisMachine(workers), report=report)
     return Path(folder)
 
 

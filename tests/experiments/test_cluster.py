@@ -23,6 +23,7 @@ from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
 from tests.assistants import own_rules
 from tests.experiments.examples import cart, contents_of, settings
+from tests.learners.own_learners import register_averaging
 
 # Ray leaves sockets and files to the garbage collector, and starts threads before it forks.
 pytestmark = [
@@ -134,7 +135,7 @@ def test_a_run_through_an_own_ray_equals_a_local_one_though_a_worker_is_killed(
     reports = []
     with RayCluster(LOCAL) as ray_cluster:
         assert ray_cluster.cores == os.cpu_count()
-        run_experiment(plan, tmp_path / "ray", executor=ray_cluster, report=reports.append)
+        run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=reports.append)
         with pytest.raises(RequestError, match=r"'local': this process uses Ray already"):
             RayCluster(LOCAL).__enter__()
     events = lines_of(log)
@@ -171,7 +172,7 @@ def test_a_run_on_two_nodes_equals_a_local_one_though_a_node_is_killed_half_way(
         monkeypatch.setattr(cluster, "_finish_batch", recorded(str(log), work_slowly))
         with RayCluster(made.address) as ray_cluster:
             assert ray_cluster.cores == 2
-            run_experiment(plan, tmp_path / "ray", executor=ray_cluster, report=report)
+            run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=report)
         assert not made.worker_nodes
     events = lines_of(log)
     begun, ended = (
@@ -203,18 +204,20 @@ def test_a_cluster_without_cores_left_ends_the_run_and_the_next_goes_on(
             pytest.raises(ConnectionError, match=r"lost all nodes with cores|lost a batch"),
             RayCluster(made.address) as ray_cluster,
         ):
-            run_experiment(plan, tmp_path / "ray", executor=ray_cluster, report=report)
+            run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=report)
     assert contents_of(tmp_path / "ray", "cells/**/*")
     assert local_run(plan, tmp_path / "ray") == local_run(plan, tmp_path / "local")
 
 
 @pytest.mark.slow
-def test_own_rules_travel_errors_come_back_as_themselves_and_what_is_finished_stays(
+def test_own_rules_and_learners_travel_errors_come_back_as_themselves_and_what_is_finished_stays(
     tmp_path, monkeypatch, own_registry, small_cells
 ):
     with pytest.warns(UserWarning, match="cannot be compiled"):
         register_assistant("own", own_rules.NoOptions)(own_rules.guide_with_a_dictionary)
-    plan = plan_of(trials=4, assistants=[{"name": "own"}, {"name": "none"}])
+    register_averaging()
+    learners = [{"name": "averaging", "hopes": 1.0}]
+    plan = plan_of(trials=4, assistants=[{"name": "own"}, {"name": "none"}], learners=learners)
     expected = local_run(plan, tmp_path / "local")
     work = cluster._finish_batch
 
@@ -232,16 +235,16 @@ def test_own_rules_travel_errors_come_back_as_themselves_and_what_is_finished_st
     with RayCluster(LOCAL) as ray_cluster:
         monkeypatch.setattr(cluster, "_finish_batch", unwilling)
         with pytest.raises(RequestError) as raised:
-            run_experiment(plan, tmp_path / "ray", executor=ray_cluster)
+            run_experiment(plan, tmp_path / "ray", backend=ray_cluster)
         assert type(raised.value) is RequestError
         assert str(raised.value) == "alpha = 7: too much"
         monkeypatch.setattr(cluster, "_finish_batch", deadly)
         with pytest.raises(ConnectionError, match="Ray lost a batch of cells 2 times, at last so"):
-            run_experiment(plan, tmp_path / "ray", executor=ray_cluster)
+            run_experiment(plan, tmp_path / "ray", backend=ray_cluster)
         assert list((tmp_path / "ray" / "cells").rglob("000000-2-*.parquet"))
         assert not list((tmp_path / "ray" / "cells").rglob("000002-2-*.parquet"))
         monkeypatch.setattr(cluster, "_finish_batch", work)
-        run_experiment(plan, tmp_path / "ray", executor=ray_cluster)
+        run_experiment(plan, tmp_path / "ray", backend=ray_cluster)
     assert contents_of(tmp_path / "ray", *TABLES) == expected
 
 
@@ -284,7 +287,7 @@ plan = make_plan(reproduction("cliff-walking", trials=trials))
 with RayCluster("local") as cluster:
     import ray
     assert [node["NodeManagerAddress"] for node in ray.nodes()] == ["127.0.0.1"]
-    run_experiment(plan, sys.argv[1], executor=cluster, report=report)
+    run_experiment(plan, sys.argv[1], backend=cluster, report=report)
 """
 
 
@@ -395,5 +398,5 @@ def test_batches_are_large_at_first_and_small_towards_the_end():
 def test_deep_learners_through_an_own_ray_are_those_of_processes(tmp_path):
     plan = make_plan(make_experiment(cart(tmp_path)))
     with RayCluster(LOCAL) as ray_cluster:
-        run_experiment(plan, tmp_path / "ray", executor=ray_cluster)
+        run_experiment(plan, tmp_path / "ray", backend=ray_cluster)
     assert contents_of(tmp_path / "ray", *TABLES) == local_run(plan, tmp_path / "local")

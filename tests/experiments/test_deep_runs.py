@@ -39,7 +39,7 @@ def whole(tmp_path_factory):
     """A finished run on two processes, and what was reported while it went on."""
     folder = tmp_path_factory.mktemp("whole")
     plan, reports = planned(folder), []
-    run_experiment(plan, folder / "out", executor=ThisMachine(2), report=reports.append)
+    run_experiment(plan, folder / "out", backend=ThisMachine(2), report=reports.append)
     return plan, folder / "out", reports
 
 
@@ -75,11 +75,11 @@ def test_more_trials_add_to_what_is_there(whole, tmp_path):
     _, folder, _ = whole
     plan, reports = planned(folder.parent, trials=3), []
     before = contents_of(folder, "cells/**/*")
-    run_experiment(plan, tmp_path / "three", executor=ThisMachine(1))
+    run_experiment(plan, tmp_path / "three", backend=ThisMachine(1))
     for name, content in before.items():
         (tmp_path / "grown" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "grown" / name).write_bytes(content)
-    run_experiment(plan, tmp_path / "grown", executor=ThisMachine(1), report=reports.append)
+    run_experiment(plan, tmp_path / "grown", backend=ThisMachine(1), report=reports.append)
     assert reports[0].trials == 4
     final = ("*.parquet", "cells/**/*")
     assert contents_of(tmp_path / "grown", *final) == contents_of(tmp_path / "three", *final)
@@ -109,7 +109,7 @@ def test_the_time_of_a_trial_is_told_from_a_few_short_episodes(whole):
 def test_successes_and_crashes_are_kept_where_the_task_tells_them(tmp_path):
     settings = cart(tmp_path, task="lunar-lander", values="expert", episodes=2, trials=1)
     settings["assistants"] = [{"name": "maximal"}]
-    run_experiment(make_plan(make_experiment(settings)), tmp_path / "out", executor=ThisMachine(1))
+    run_experiment(make_plan(make_experiment(settings)), tmp_path / "out", backend=ThisMachine(1))
     episodes = load(tmp_path / "out").episodes
     assert episodes["assisted_success"].to_list() == [True, True]  # the expert's own landing
     assert episodes["assisted_crash"].to_list() == [False, False]
@@ -158,7 +158,7 @@ def test_a_stopped_run_keeps_what_is_finished_and_leaves_no_process(tmp_path, nu
     assert 2 <= len(kept) < 12
     reports = []
     plan = planned(tmp_path, trials=6, episodes=100)
-    run_experiment(plan, tmp_path / "out", executor=ThisMachine(2), report=reports.append)
+    run_experiment(plan, tmp_path / "out", backend=ThisMachine(2), report=reports.append)
     assert reports[0].trials == len(kept)
     assert kept.items() <= contents_of(tmp_path / "out", "cells/**/*").items()
 
@@ -213,7 +213,7 @@ def test_a_lost_worker_is_told_in_one_line(tmp_path, monkeypatch):
                 child.kill()
 
     with pytest.raises(ChildProcessError, match=r"a worker process was lost"):
-        run_experiment(plan, tmp_path / "out", executor=ThisMachine(2), report=kill)
+        run_experiment(plan, tmp_path / "out", backend=ThisMachine(2), report=kill)
     assert cells_of(tmp_path / "out")
 
 
@@ -221,4 +221,4 @@ def test_what_goes_wrong_in_a_process_is_told_as_here(tmp_path):
     bumpers = {"name": "stochastic-q-bumpers", "alpha": 0.5, "v_min": 1000.0}
     plan = planned(tmp_path, assistants=[{"name": "none"}, bumpers])
     with pytest.raises(RequestError, match=r"v_min = 1000 must be below the value of the start"):
-        run_experiment(plan, tmp_path / "out", executor=ThisMachine(1))
+        run_experiment(plan, tmp_path / "out", backend=ThisMachine(1))

@@ -71,7 +71,7 @@ def test_every_field_is_read_from_toml(tmp_path):
     made = learner.learner(task_discount=0.9)
     assert tuple(made.epsilon) == (0.9, 0.1, 0.5)
     assert tuple(made.learning_rate) == (0.7, 0.2, 0.25)
-    assert (made.discount, made.initial_value, made.penalty) == (0.8, -1.5, 2.5)
+    assert (made.discount, made.initial_value, learner.penalty) == (0.8, -1.5, 2.5)
 
 
 def test_what_is_written_reads_back_as_the_same_experiment(tmp_path):

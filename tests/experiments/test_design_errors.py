@@ -46,8 +46,8 @@ WRONG = {
         r"learners\.0\.epsilon\.fractoin = 0\.5: unknown field \(did you mean 'fraction'\?\)",
     ),
     "unknown learner": (
-        {"learners": [{"name": "sarsa"}]},
-        r"learners\.0\.name = 'sarsa': .*'q-learning'",
+        {"learners": [{"name": "sarsaa"}]},
+        r"unknown learners\.name 'sarsaa' \(did you mean 'sarsa'\?\)",
     ),
     "unknown perception": (
         {"learners": [{"perception": "transitoin"}]},

@@ -1,16 +1,17 @@
-"""People as data: each way of learning has its own fields, and suits tasks of one kind."""
+"""Learners as data: each kind has its own fields, and suits tasks of one kind."""
 
 import pytest
 import tomli_w
 
 from qbumpers.errors import RequestError
-from qbumpers.experiments.learner_designs import DoubleDQNDesign, QLearnerDesign
+from qbumpers.experiments.learner_designs import design_class
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.learners import DoubleDQN, QLearner
 from tests.experiments.examples import cart, settings, write_toml
 from tests.values.networks import network_of
 
+DEEP, TABULAR = design_class("double-dqn"), design_class("q-learning")
 # The experts of these experiments are random networks.
 pytestmark = pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning")
 
@@ -44,15 +45,18 @@ def test_every_field_of_a_deep_learner_is_read_from_toml(tmp_path):
     assert tuple(learner.network) == ((32, 16, 8), "relu", 4)
     assert tuple(learner.epsilon) == (0.9, 0.1, 0.5)
     assert {k: v for k, v in learner._asdict().items() if k not in ("network", "epsilon")} == {
-        k: v for k, v in EVERYTHING.items() if k not in ("name", "perception", "network", "epsilon")
+        k: v
+        for k, v in EVERYTHING.items()
+        if k not in ("name", "perception", "penalty", "network", "epsilon")
     }
+    assert design.penalty == 2.5
 
 
 def test_designs_without_settings_are_the_learners_without_settings():
-    assert DoubleDQNDesign().learner(0.99) == DoubleDQN()
-    assert QLearnerDesign().learner(1.0) == QLearner()
-    assert DoubleDQNDesign().learner(0.5).discount == 0.5
-    assert DoubleDQNDesign(discount=0.7).learner(0.5).discount == 0.7
+    assert DEEP().learner(0.99) == DoubleDQN()
+    assert TABULAR().learner(1.0) == QLearner()
+    assert DEEP().learner(0.5).discount == 0.5
+    assert DEEP(discount=0.7).learner(0.5).discount == 0.7
 
 
 def test_what_is_written_reads_back_as_the_same_experiment(tmp_path):
@@ -98,9 +102,9 @@ def test_lists_are_swept_over_and_ids_tell_what_differs():
 
 
 WRONG = {
-    "unknown way": (
-        {"name": "sarsa"},
-        r"learners\.0\.name = 'sarsa': .*'q-learning' or 'double-dq",
+    "unknown kind": (
+        {"name": "q-lerning"},
+        r"unknown learners\.name 'q-lerning' \(did you mean 'q-learning'\?\)\. Known: .*'?sarsa",
     ),
     "field of the other": (
         {"name": "double-dqn", "initial_value": 0.0},
@@ -146,9 +150,10 @@ def test_a_wrong_learner_is_refused(learner, message):
         make_experiment(settings(learners=[learner]))
 
 
-def test_two_ways_of_learning_are_not_mixed():
+def test_learners_that_observe_differently_are_not_mixed():
     learners = [{"name": "q-learning"}, {"name": "double-dqn"}]
-    with pytest.raises(RequestError, match=r"learners\.name = 'double-dqn'; .* by 'q-learning'"):
+    message = r"learners\.name = 'double-dqn'; it observes vectors, .*'q-learning', .*, states"
+    with pytest.raises(RequestError, match=message):
         make_experiment(settings(learners=learners))
 
 
@@ -162,7 +167,8 @@ def test_two_ways_of_learning_are_not_mixed():
 def test_a_learner_that_does_not_suit_the_task_is_refused(task, name, suitable):
     experiment = make_experiment(settings(task=task, learners=[{"name": name}]))
     with pytest.raises(
-        RequestError, match=rf"learners\.name = '{name}'; at task .* people learn by '{suitable}'"
+        RequestError,
+        match=rf"learners\.name = '{name}'; it observes .* is learned by .*'{suitable}'",
     ):
         make_plan(experiment)
 

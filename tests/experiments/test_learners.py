@@ -89,14 +89,14 @@ def test_each_learner_gets_its_own_rows_as_simulated_alone(tmp_path):
     results = load(folder)
     ids = ids_of(learners=learners, assistants=[{**BUMPERS, "alpha": 0.3}])
     made = [
-        ("transition", QLearner(penalty=7.5)),
-        ("transition-disruption", QLearner(penalty=7.5)),
-        ("transition", QLearner(0.9, Schedule(**schedule), Schedule(**schedule), -3.0)),
+        ("transition", 7.5, QLearner()),
+        ("transition-disruption", 7.5, QLearner()),
+        ("transition", 1.0, QLearner(0.9, Schedule(**schedule), Schedule(**schedule), -3.0)),
     ]
     assistant = make_assistant("stochastic-q-bumpers", alpha=0.3, second=True)
-    for name, (perception, learner) in zip(ids, made, strict=True):
+    for name, (perception, penalty, learner) in zip(ids, made, strict=True):
         outcomes = simulate(
-            cliff_walking(), assistant, learner=learner, perception=perception,
+            cliff_walking(), assistant, learner=learner, perception=perception, penalty=penalty,
             episodes=4, trials=5, seed=3,
         ).outcomes  # fmt: skip
         rows = results.episodes.filter(pl.col("condition") == name)

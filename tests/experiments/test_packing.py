@@ -1,4 +1,4 @@
-"""Own rules reach another process, which computes the same bytes."""
+"""Own rules and learners reach another process, which computes the same bytes."""
 
 import importlib
 import pickle
@@ -11,10 +11,10 @@ import pytest
 from qbumpers.assistants import register_assistant
 from qbumpers.assistants.registry import assistants
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.packing import packed, unpacked
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.work import finish
+from qbumpers.simulation.packing import packed
 from tests.assistants import own_rules
 from tests.experiments.examples import settings
 
@@ -38,14 +38,14 @@ def kind(situation, noise, options):
 
 ELSEWHERE = """
 import pickle, sys, warnings
-from qbumpers.experiments.packing import unpacked
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.work import finish
 
-warnings.simplefilter("ignore")
-shared = unpacked(open(sys.argv[1], "rb").read())
+warnings.simplefilter("error")
+conditions, seed = pickle.load(open(sys.argv[1], "rb"))
+conditions = pickle.loads(conditions)
 assert "kindness_rules" not in sys.modules
-done = [finish(c, Cell(name, 1, 2), shared.seed) for name, c in shared.conditions.items()]
+done = [finish(c, Cell(name, 1, 2), seed) for name, c in conditions.items()]
 pickle.dump(done, open(sys.argv[2], "wb"))
 """
 
@@ -64,7 +64,7 @@ def test_another_process_without_the_module_of_a_rule_computes_the_same_bytes(
     with pytest.warns(UserWarning, match="cannot be compiled"):
         register_assistant("kind", rules.Options)(rules.kind)
     plan = plan_of({"name": "none"}, {"name": "kind", "kindness": [0.2, 0.9]})
-    (tmp_path / "packed").write_bytes(packed(plan))
+    (tmp_path / "packed").write_bytes(pickle.dumps((packed(plan.conditions), plan.experiment.seed)))
     command = [sys.executable, "-c", ELSEWHERE, tmp_path / "packed", tmp_path / "done"]
     subprocess.run(command, check=True, cwd=tmp_path)
     done = pickle.loads((tmp_path / "done").read_bytes())
@@ -85,8 +85,8 @@ def test_a_rule_is_compiled_with_its_own_settings(own_registry):
         observe=own_rules.spend,
     )(own_rules.guide_within_budget)
     before = assistants()
-    content = packed(plan_of({"name": "fast"}, {"name": "budget", "budget": 3}))
-    unpacked(content)
+    content = packed(plan_of({"name": "fast"}, {"name": "budget", "budget": 3}).conditions)
+    pickle.loads(content)
     after = assistants()
     for name in ("fast", "budget"):
         assert after[name] is not before[name]
@@ -104,17 +104,16 @@ def test_a_rule_is_compiled_with_its_own_settings(own_registry):
 def test_built_in_rules_are_not_registered_again():
     before = assistants()
     plan = plan_of({"name": "none"}, {"name": "stochastic-q-bumpers", "alpha": 0.5}, seed=9)
-    shared = unpacked(packed(plan))
+    conditions = pickle.loads(packed(plan.conditions))
     assert assistants() == before
-    assert shared.seed == 9
-    content, condition = next(iter(shared.conditions.items()))
+    content, condition = next(iter(conditions.items()))
     cell = Cell(content, 0, 1)
     assert finish(condition, cell, 9) == finish(plan.conditions[content], cell, 9)
 
 
 def test_modules_are_pickled_by_name_again_afterwards(own_registry):
     register_assistant("watch", own_rules.NoOptions)(own_rules.watch)
-    packed(plan_of({"name": "watch"}))
+    packed(plan_of({"name": "watch"}).conditions)
     assert b"own_rules" in pickle.dumps(own_rules.watch)
     import cloudpickle
 

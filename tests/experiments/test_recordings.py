@@ -5,8 +5,10 @@ import polars as pl
 import pytest
 
 import qbumpers
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
-from qbumpers.experiments.recordings import INFOS, export_recording
+from qbumpers.experiments.recordings import INFOS, _episodes, export_recording
+from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from tests.experiments.examples import run_into
 
 minari = pytest.importorskip("minari")
@@ -62,6 +64,27 @@ def test_an_episode_ends_at_the_goal_or_is_cut(recorded):
         assert episode.terminations[-1] == (episode.observations[-1] == 47)
         assert episode.truncations[-1] == (not episode.terminations[-1])
         assert episode.terminations[-1] or len(episode.actions) == 100
+        assert not episode.infos["undone"].any()
+
+
+def test_ends_follow_the_events_and_an_undone_step_leads_back():
+    """Two episodes: one ends for good after an undone step, one is cut in the midst of a step."""
+    numbers, real = np.array([0, 0, 1]), np.zeros(3)
+    steps = Step(
+        episode=numbers, state=np.array([5, 5, 7]), proposed=numbers, executed=numbers,
+        undone=np.array([True, False, True]), credited=numbers, overridden=np.zeros(3, bool),
+        probability=real, coin=real, tie=real, values=np.zeros((3, 2)), projected_return=real,
+        reward=real, next_state=np.array([6, 8, 9]),
+        events=np.array([0, TERMINATED, LIMIT], np.uint8),
+    )  # fmt: skip
+    first, second = _episodes(4, steps)
+    assert first["observations"].tolist() == [5, 5, 8]
+    assert first["infos"]["undone"].tolist() == [False, True, False]
+    assert (first["terminations"].tolist(), first["truncations"].any()) == ([False, True], False)
+    assert second["observations"].tolist() == [7, 7]
+    assert (second["terminations"].tolist(), second["truncations"].tolist()) == ([False], [True])
+    [cut] = _episodes(0, Step(*(a[2:] for a in steps))._replace(events=np.array([TRUNCATED])))
+    assert cut["truncations"].tolist() == [True]
 
 
 def test_infos_have_one_structure_with_an_entry_for_the_reset(recorded):

@@ -53,7 +53,7 @@ def experiments() -> dict[str, Experiment]:
 def run_numbers(experiment: Experiment) -> dict[str, Any]:
     """A digest and two means of each condition."""
     with tempfile.TemporaryDirectory() as folder:
-        run_experiment(make_plan(experiment), Path(folder) / "out", executor=ThisMachine(2))
+        run_experiment(make_plan(experiment), Path(folder) / "out", backend=ThisMachine(2))
         episodes = load(Path(folder) / "out").episodes
     return {
         condition: {

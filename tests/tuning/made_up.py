@@ -64,11 +64,9 @@ def planned(conditions, trials=20, **changes):
 
 
 def tuned(folder, means, floor=0.0, trials=20, confidence=0.95, **made):
-    executor = MadeUp(means, **made)
-    found = tune(
-        planned(len(means), trials), folder, floor, confidence=confidence, executor=executor
-    )
-    return found, executor
+    backend = MadeUp(means, **made)
+    found = tune(planned(len(means), trials), folder, floor, confidence=confidence, backend=backend)
+    return found, backend
 
 
 def verdicts(found):

@@ -55,7 +55,7 @@ def test_a_condition_at_the_floor_is_rarely_chosen(tmp_path):
 def test_cliff_walking_is_tuned_with_a_third_of_the_trials_of_its_grid(tmp_path, seed, floor):
     """The choice is the grid's, or one that the grid's 1,000 trials cannot tell from it."""
     plan = make_plan(reproduction("cliff-walking", trials=1000, seed=seed))
-    found = tune(plan, tmp_path, floor, executor=ThisMachine(2))
+    found = tune(plan, tmp_path, floor, backend=ThisMachine(2))
     assert found.trials <= found.grid_trials / 3
     grid = {}
     for named, content in plan.named:

@@ -20,7 +20,7 @@ from tests.tuning.made_up import MadeUp, planned, tuned
 def test_the_trials_that_are_counted_are_those_that_were_run_each_once(tmp_path):
     seen = []
     made = MadeUp([(3, 1), (3, 5), (-3, 4), (3, 4.9)])
-    found = tune(planned(4, 100), tmp_path, 0.0, executor=made, report=seen.append)
+    found = tune(planned(4, 100), tmp_path, 0.0, backend=made, report=seen.append)
     run_trials = [(cell.content, t) for cell in made.cells for t in range(cell.first, cell.end)]
     assert len(run_trials) == len(set(run_trials)) == found.trials
     assert found.saved == pytest.approx(1 - found.trials / 400)
@@ -36,7 +36,7 @@ def test_what_was_finished_before_an_interruption_is_not_run_again(tmp_path, sto
     whole, undisturbed = tuned(tmp_path / "whole", means, trials=100)
     stopped = MadeUp(means, stop_after=stop_after)
     with pytest.raises(KeyboardInterrupt):
-        tune(planned(4, 100), tmp_path / "stopped", 0.0, executor=stopped)
+        tune(planned(4, 100), tmp_path / "stopped", 0.0, backend=stopped)
     found, continued = tuned(tmp_path / "stopped", means, trials=100)
     assert found == whole
     assert stopped.cells + continued.cells == undisturbed.cells
@@ -52,7 +52,7 @@ def test_a_damaged_cell_is_reported_and_run_again(tmp_path):
     damaged = cells_of(tmp_path)[0]
     damaged.write_bytes(damaged.read_bytes()[:-1])
     seen, made = [], MadeUp(means)
-    assert tune(planned(2), tmp_path, 0.0, executor=made, report=seen.append) == whole
+    assert tune(planned(2), tmp_path, 0.0, backend=made, report=seen.append) == whole
     assert [str(tmp_path / name) for name in seen[0].damaged] == [str(damaged)]
     assert len(made.cells) == 1
 
@@ -75,10 +75,10 @@ def real():
 
 def test_a_run_uses_the_trials_of_tuning_and_ends_as_without_it(tmp_path):
     first, rest, whole = Counting(), Counting(), Counting()
-    found = tune(real(), tmp_path / "tuned", -1e4, executor=first)
+    found = tune(real(), tmp_path / "tuned", -1e4, backend=first)
     assert found.choice is not None
-    run_experiment(real(), tmp_path / "tuned", executor=rest)
-    run_experiment(real(), tmp_path / "plain", executor=whole)
+    run_experiment(real(), tmp_path / "tuned", backend=rest)
+    run_experiment(real(), tmp_path / "plain", backend=whole)
     assert not set(first.trials) & set(rest.trials)
     assert set(rest.trials) < set(whole.trials) < set(first.trials) | set(rest.trials)
     tables = [pl.read_parquet(tmp_path / f / EPISODES, glob=False) for f in ("tuned", "plain")]
@@ -86,17 +86,17 @@ def test_a_run_uses_the_trials_of_tuning_and_ends_as_without_it(tmp_path):
 
 
 def test_tuning_uses_the_trials_of_a_run_and_ends_as_without_it(tmp_path):
-    run_experiment(real(), tmp_path / "run", executor=Counting())
+    run_experiment(real(), tmp_path / "run", backend=Counting())
     counting = Counting()
-    found = tune(real(), tmp_path / "run", -1e4, executor=counting)
+    found = tune(real(), tmp_path / "run", -1e4, backend=counting)
     assert [trial for _, trial in counting.trials] == list(range(24, 48))
-    plain = tune(real(), tmp_path / "plain", -1e4, executor=Counting())
+    plain = tune(real(), tmp_path / "plain", -1e4, backend=Counting())
     assert found.contenders == plain.contenders
 
 
 def test_the_number_of_workers_changes_nothing(tmp_path):
     for workers in (1, 3):
-        tune(real(), tmp_path / str(workers), -1e4, executor=ThisMachine(workers))
+        tune(real(), tmp_path / str(workers), -1e4, backend=ThisMachine(workers))
     for name in ("tuning.csv", "tuning.toml"):
         assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "3" / name).read_bytes()
 

@@ -293,7 +293,7 @@ def register_assistant(
 
 
 def _of_user(rule: Rule) -> Rule:
-    fresh = fresh_class(rule.options_type)
+    fresh = fresh_class(rule.options_type, rule.name, _remade)
     # Registered while it is compiled, so that it can be found by its options.
     attempts = {
         kind: lambda decide, start, observe, kind=kind: _compile_for(
@@ -392,9 +392,7 @@ def make_assistant(name: str, **options: Any) -> Assistant:
     Raises:
         RequestError: if the name is unknown, or an option is unknown, missing or out of range.
     """
-    if name not in _rules:
-        raise unknown_name("assistant", name, _rules)
-    rule = _rules[name]
+    rule = _registered(name)
     if rule.over_a_rule and "of" in options:
         options = {**options, "of": assistant_of(options["of"], f"assistant {name}: of")}
     made = Assistant(rule, _checked(rule, options))
@@ -424,11 +422,20 @@ def assistant_of(given: Any, where: str) -> Assistant:
     )
 
 
-def _unpickled(name: str, options: dict[str, Any], numbers: tuple[Any, ...]) -> Assistant:
-    """An assistant where it arrives; its files are not read again."""
+def _registered(name: str) -> Rule:
     if name not in _rules:
         raise unknown_name("assistant", name, _rules)
-    rule = _rules[name]
+    return _rules[name]
+
+
+def _remade(name: str, values: tuple[Any, ...]) -> Any:
+    """Options where they arrive, of the rule that is registered there."""
+    return _registered(name).options_type._make(values)  # type: ignore[attr-defined]
+
+
+def _unpickled(name: str, options: dict[str, Any], numbers: tuple[Any, ...]) -> Assistant:
+    """An assistant where it arrives; its files are not read again."""
+    rule = _registered(name)
     made = Assistant(rule, rule.options_type(**options))
     again: Any = rule.options_type(*numbers)
     made.__dict__["numbers"] = again._replace(of=made.of.numbers) if made.of else again

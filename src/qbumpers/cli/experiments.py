@@ -17,14 +17,14 @@ from qbumpers.cli.console import (
     typeable,
 )
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import On, Out, Workers, executor_for
+from qbumpers.cli.working import On, Out, Workers, backend_for
 from qbumpers.errors import RequestError
 
 if TYPE_CHECKING:
     import polars as pl
 
     from qbumpers.experiments.design import Experiment
-    from qbumpers.experiments.run import Progress
+    from qbumpers.experiments.run import RunProgress
 
 
 @application.command()
@@ -165,12 +165,12 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
         f"trials of {experiment.episodes} episodes{more}, into {escape(folder)}",
         soft_wrap=True,
     )
-    with executor_for(workers, on) as executor, TrialProgress("simulating", _announce) as progress:
-        run_experiment(plan, folder, executor=executor, report=progress.show)
+    with backend_for(workers, on) as backend, TrialProgress("simulating", _announce) as progress:
+        run_experiment(plan, folder, backend=backend, report=progress.show)
     _analyse(folder)
 
 
-def _announce(done: "Progress") -> None:
+def _announce(done: "RunProgress") -> None:
     if done.trials == done.of:
         OUTPUT.print("All trials are there already.")
         return

@@ -12,7 +12,7 @@ from rich.text import Text
 from qbumpers.cli.console import ERRORS, OUTPUT, duration
 
 if TYPE_CHECKING:
-    from qbumpers.experiments.run import Progress
+    from qbumpers.experiments.run import RunProgress
     from qbumpers.tuning import TuningProgress
 
 _TRUST = 4  # finished trials that weigh as much as what was expected before the first
@@ -52,7 +52,7 @@ class TrialProgress:
         self._waiting.stop()
         self._bar.stop()
 
-    def show(self, done: "Progress | TuningProgress") -> None:
+    def show(self, done: "RunProgress | TuningProgress") -> None:
         """Show how far it is."""
         if self._begun is None:
             self._begun = time.monotonic()

@@ -10,7 +10,7 @@ from rich.table import Table
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import On, Out, Workers, executor_for
+from qbumpers.cli.working import On, Out, Workers, backend_for
 
 if TYPE_CHECKING:
     from qbumpers.tuning import Contender, Tuning
@@ -55,11 +55,11 @@ def tune(
             soft_wrap=True,
         )
         with (
-            executor_for(workers, on) as executor,
+            backend_for(workers, on) as backend,
             TrialProgress("racing", _silent) as progress,
         ):
             found = tuning.tune(
-                plan, folder, floor, confidence=confidence, executor=executor, report=progress.show
+                plan, folder, floor, confidence=confidence, backend=backend, report=progress.show
             )
         OUTPUT.print(_contenders(found))
         OUTPUT.print(_cost(found))

@@ -10,7 +10,7 @@ from qbumpers.cli.console import OUTPUT
 from qbumpers.errors import RequestError
 
 if TYPE_CHECKING:
-    from qbumpers.experiments.run import Executor
+    from qbumpers.experiments.run import Backend
 
 Workers = Annotated[
     int | None, typer.Option(help="Cores to use.", show_default="all cores", metavar="N", min=1)
@@ -34,7 +34,7 @@ Out = Annotated[
 
 
 @contextlib.contextmanager
-def executor_for(workers: int | None, on: str | None) -> Iterator["Executor"]:
+def backend_for(workers: int | None, on: str | None) -> Iterator["Backend"]:
     """Where cells are worked on: cores of this machine, or a Ray cluster."""
     from qbumpers.experiments.local import ThisMachine
 

@@ -4,6 +4,7 @@ import functools
 import hashlib
 import importlib.metadata
 import os
+import pickle
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,10 @@ from qbumpers.experiments.addresses import (
     unusable,
 )
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.packing import Shared, packed, unpacked
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
+from qbumpers.simulation import Condition
+from qbumpers.simulation.packing import packed
 
 BATCH_SECONDS = 2.0
 """Work handed over at once, at most: long beside Ray's milliseconds, short for a progress bar."""
@@ -108,7 +110,7 @@ class RayCluster:
         ray = self._ray
         submit = ray.remote(num_cpus=1, max_retries=_RETRIES)(_finish_batch).remote
         # In a list: Ray would otherwise unpack it again for every batch.
-        shared = [ray.put(packed(plan))]
+        shared = [ray.put((packed(plan.conditions), plan.experiment.seed))]
         remaining = batches(seconds, self.cores)
         waiting: list[Any] = []
         try:
@@ -172,10 +174,12 @@ def _finish_batch(shared: list[Any], cells: list[Cell], expected: dict[str, str]
 
 
 @functools.lru_cache(maxsize=1)
-def _unpacked(reference: Any) -> Shared:
+def _unpacked(reference: Any) -> tuple[dict[str, Condition], int]:
+    """Conditions by content, and the seed, once per process."""
     import ray
 
-    return unpacked(ray.get(reference))
+    conditions, seed = ray.get(reference)
+    return pickle.loads(conditions), seed
 
 
 def _received(ray: Any, reference: Any) -> Any:

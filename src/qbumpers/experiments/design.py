@@ -1,10 +1,8 @@
 """What an experiment is: data, in a TOML file or as the same model in Python."""
 
-import itertools
-import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from collections.abc import Sequence
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import (
     BeforeValidator,
@@ -15,11 +13,12 @@ from pydantic import (
     model_validator,
 )
 
-from qbumpers.assistants import Assistant, assistants, make_assistant
+from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
 from qbumpers.experiments.learner_designs import LearnerDesign, apart, by_name, written
 from qbumpers.experiments.models import Model
+from qbumpers.experiments.sweeps import combinations, options_listed, swept, tables_listed
 from qbumpers.learners import learners
 from qbumpers.tasks import Task, make_task
 
@@ -62,33 +61,13 @@ class AssistantDesign(Model):
 
     def assistants(self) -> list[Assistant]:
         """One assistant for each combination of listed options, the last option fastest."""
-        listed = _options_listed(self.name, self.model_extra or {})
+        listed = options_listed(self.name, self.model_extra or {})
         combinations = swept(listed, f"assistant {self.name}")
         return [make_assistant(self.name, **options) for options in combinations]
 
     def count(self) -> int:
         """How many assistants there are, counted without making them."""
-        return combinations(_options_listed(self.name, self.model_extra or {}))
-
-
-def _options_listed(name: str, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options with a list if, and only if, they are to be swept over.
-
-    A list is a value of an option that is a tuple, and a list of such lists is swept over; the
-    options of another assistant (`of`) are swept over inside their own table.
-    """
-    rules = assistants()
-    hints = get_type_hints(rules[name].options_type) if name in rules else {}
-    listed = dict(options)
-    for option, value in options.items():
-        is_tuple = getattr(hints.get(option), "__origin__", None) is tuple
-        if is_tuple and isinstance(value, list) and not any(isinstance(v, list) for v in value):
-            listed[option] = [value]
-        elif option == "of" and isinstance(value, dict) and isinstance(value.get("name"), str):
-            inner = {field: each for field, each in value.items() if field != "name"}
-            tables = swept(_options_listed(value["name"], inner), f"assistant {value['name']}")
-            listed[option] = [{"name": value["name"], **table} for table in tables]
-    return listed
+        return combinations(options_listed(self.name, self.model_extra or {}))
 
 
 class NamedCondition(NamedTuple):
@@ -213,6 +192,7 @@ class Experiment(Model):
 
 def _all_learners(given: list[Any], task: Any) -> list[Any]:
     """Learners by name, with listed fields swept over."""
+    given = [tables_listed(each) if isinstance(each, dict) else each for each in given]
     tables = [each for each in given if isinstance(each, dict)]
     many = sum(map(combinations, tables))
     if many > MANY_CELLS:
@@ -238,31 +218,6 @@ def _learner_name(task: Any) -> str:
         return TaskDesign.model_validate(task).task().learners[0]
     except (ValidationError, RequestError):
         return "q-learning"  # what is wrong with the task is told where the task is needed
-
-
-def combinations(options: Mapping[str, Any]) -> int:
-    """How many combinations `swept` makes."""
-    return math.prod(len(value) for value in options.values() if isinstance(value, list))
-
-
-def swept(options: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
-    """Every combination of listed options.
-
-    Args:
-        options: by name; lists are swept over.
-        where: for messages, for instance "assistant stochastic-q-bumpers".
-
-    Returns:
-        Options by name, the last listed one changing fastest.
-
-    Raises:
-        RequestError: where a list is empty.
-    """
-    for option, values in options.items():
-        if values == []:
-            raise RequestError(f"{where}: {option} = []; at least one value is needed")
-    lists = [value if isinstance(value, list) else [value] for value in options.values()]
-    return [dict(zip(options, values, strict=True)) for values in itertools.product(*lists)]
 
 
 def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, create_model
 
 from qbumpers.assistants import Assistant
-from qbumpers.errors import unknown_name
+from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.models import Model, model_fields_of, model_of, settings_of
 from qbumpers.learners import PERCEPTIONS, Motor, Perception, learner_type, learners
 
@@ -18,6 +18,11 @@ _MotorDesign: Any = model_of(Motor)
 def _known_perception(given: Any) -> Any:
     if isinstance(given, str) and given not in PERCEPTIONS:
         raise unknown_name("learners.perception", given, PERCEPTIONS)
+    if not isinstance(given, str | dict | _PerceptionDesign):
+        raise RequestError(
+            f"learners.perception = {given!r}; a name or a table with "
+            f"{', '.join(Perception._fields)} is needed"
+        )
     return given if isinstance(given, str) else _PerceptionDesign.model_validate(given)
 
 
@@ -72,6 +77,7 @@ class LearnerDesign(Model):
     def described(self) -> dict[str, Any]:
         """Every field in the order in which ids tell them."""
         fields = self.model_dump()
+        fields["motor"] = fields["motor"] or Motor()._asdict()
         last = {name: fields.pop(name) for name in ("penalty", "motor", "forgetting")}
         return {**fields, **last}
 

@@ -16,9 +16,9 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
 from qbumpers.simulation import record
 from qbumpers.tasks import Task
-from qbumpers.tasks.dynamics import TERMINATED
+from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
-INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
+INFOS = ("proposed", "undone", "credited", "overridden", "probability", "coin", "tie", "values",
          "projected_return")  # fmt: skip
 """What the `infos` of each step hold beside `trial` and `episode`; see `qbumpers.Step`."""
 
@@ -32,8 +32,9 @@ def export_recording(
 
     Observations are numbers of states [N + 1], or vectors [N + 1, D]; actions are the executed ones
     [N]. `infos` has the same keys in every episode, `INFOS` with `trial` and `episode`, as arrays
-    [N + 1]: one entry for the reset, where numbers are -1 or NaN, and one a step. Episodes in which
-    the assistant is gone are there too, with probability 0.
+    [N + 1]: one entry for the reset, where numbers are -1 or NaN, and one per step. After a step
+    that was undone, the observation is the one before it. Episodes in which the assistant is gone
+    are there too, with probability 0.
 
     Args:
         folder: of the run.
@@ -91,7 +92,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
                 observation_space=task.observation_space,
                 action_space=gymnasium.spaces.Discrete(task.actions),
                 algorithm_name=condition,
-                description=f"Simulated people at {task.name}, assisted by {condition}.",
+                description=f"Simulated learners at {task.name}, assisted by {condition}.",
             )
         except ValueError as error:
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
@@ -103,12 +104,12 @@ def _episodes(trial: int, steps: Step) -> Iterator[dict[str, Any]]:
     for first, end in itertools.pairwise([0, *ends]):
         part = Step(*(array[first:end] for array in steps))
         terminated = (part.events & TERMINATED) > 0
-        truncated = np.zeros(end - first, bool)
-        truncated[-1] = not terminated[-1]
+        truncated = (part.events & (TRUNCATED | LIMIT)) > 0
+        last = part.state if part.undone[-1] else part.next_state
         infos = {name: _after_reset(getattr(part, name)) for name in INFOS}
         numbers = {"trial": trial, "episode": int(part.episode[0])}
         yield {
-            "observations": np.concatenate([part.state, part.next_state[-1:]]),
+            "observations": np.concatenate([part.state, last[-1:]]),
             "actions": part.executed,
             "rewards": part.reward,
             "terminations": terminated,

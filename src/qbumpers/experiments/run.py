@@ -12,7 +12,7 @@ from qbumpers.experiments.store import open_store
 from qbumpers.experiments.work import Finished
 
 
-class Executor(Protocol):
+class Backend(Protocol):
     """Where cells are worked on.
 
     Attributes:
@@ -26,7 +26,7 @@ class Executor(Protocol):
         ...
 
 
-class Progress(NamedTuple):
+class RunProgress(NamedTuple):
     """How far a run is.
 
     Attributes:
@@ -48,22 +48,22 @@ def run_experiment(
     plan: Plan,
     folder: str | Path,
     *,
-    executor: Executor | None = None,
-    report: Callable[[Progress], None] = lambda progress: None,
+    backend: Backend | None = None,
+    report: Callable[[RunProgress], None] = lambda progress: None,
 ) -> None:
     """Run an experiment into a folder, or what is missing of it.
 
     Args:
         plan: the experiment, made ready.
         folder: of the results; a killed run continues there.
-        executor: where to; all cores of this machine where None.
+        backend: where to run; all cores of this machine if None.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Raises:
         RequestError: where the folder holds another experiment, or another run is writing to it.
         StoreError: where results cannot be written; finished cells stay.
     """
-    executor = executor or ThisMachine()
+    backend = backend or ThisMachine()
     design = plan.experiment
     with open_store(folder, design) as store:
         store.write_values(plan.values)
@@ -80,11 +80,11 @@ def run_experiment(
         ]
         total = design.trials * len(plan.conditions)
         seconds = estimated_seconds(plan, missing)
-        expected = sum(seconds.values()) / executor.cores
+        expected = sum(seconds.values()) / backend.cores
         done = total - sum(cell.trials for cell in missing)
-        progress = Progress(done, total, 0, expected, found.damaged)
+        progress = RunProgress(done, total, 0, expected, found.damaged)
         report(progress)
-        with contextlib.closing(executor(plan, seconds)) as work:
+        with contextlib.closing(backend(plan, seconds)) as work:
             for finished in work:
                 store.write(finished.cell, finished.files)
                 progress = progress._replace(

@@ -93,7 +93,7 @@ def register_learner(
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
     compiled = True
     if not built_in:
-        settings_type = fresh_class(settings_type)
+        settings_type = fresh_class(settings_type, name, _remade)
         attempt = partial(_compile_once, settings_type, observes)
         functions, compiles_for = compiled_or_plain(
             f"learner {name!r}", functions, {observes: attempt}
@@ -143,6 +143,11 @@ def learner_type(name: str) -> LearnerType:
     if name not in _learners:
         raise unknown_name("learner", name, _learners)
     return _learners[name]
+
+
+def _remade(name: str, values: tuple[Any, ...]) -> Any:
+    """Settings where they arrive, of the learner that is registered there."""
+    return learner_type(name).settings_type._make(values)  # type: ignore[attr-defined]
 
 
 def learner_for_settings(settings_type: type) -> LearnerType:

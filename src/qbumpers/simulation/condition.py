@@ -13,6 +13,7 @@ from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.simulation.outcomes import Outcomes
+from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
 
@@ -85,6 +86,11 @@ class Condition(NamedTuple):
     retention: int = 0
     common_random_numbers: bool = False
 
+    def __reduce__(self) -> Any:
+        """Pickle with the user's own rules and learner, which are registered on unpickling."""
+        # First of the arguments, so that they are there when the others, which name them, come.
+        return _arrived, (Own(self.assistant.chain, [self.learner_type]), *self)
+
     @property
     def learner_type(self) -> LearnerType:
         """The registered kind of its learner."""
@@ -145,6 +151,10 @@ class Condition(NamedTuple):
             "episodes": self.episodes,
             **{name: part for name, part in added.items() if part},
         }
+
+
+def _arrived(own: None, *fields: Any) -> Condition:
+    return Condition(*fields)
 
 
 def _digest(values: Any) -> Any:

@@ -30,7 +30,7 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments.design import NamedCondition
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan
-from qbumpers.experiments.run import Executor
+from qbumpers.experiments.run import Backend
 from qbumpers.experiments.store import open_store
 from qbumpers.files import open_folder
 from qbumpers.tuning.race import CHOSEN, UNCONFIRMED, Race, quiet
@@ -106,7 +106,7 @@ def tune(
     floor: float,
     *,
     confidence: float = CONFIDENCE,
-    executor: Executor | None = None,
+    backend: Backend | None = None,
     report: Callable[[TuningProgress], None] = lambda progress: None,
 ) -> Tuning:
     """Find the condition that teaches best among those that perform above a floor.
@@ -120,7 +120,7 @@ def tune(
         folder: of the results; tuning that was killed continues there.
         floor: assisted return that is needed, in reward units.
         confidence: that the choice is above the floor; the module says how it is meant.
-        executor: where to run; threads on all cores of this machine if None.
+        backend: where to run; threads on all cores of this machine if None.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Returns:
@@ -134,7 +134,7 @@ def tune(
     _check(plan, floor, confidence)
     with quiet(), open_store(folder, plan.experiment) as store:
         store.write_values(plan.values)
-        trials = Trials(plan, store, executor or ThisMachine(), report)
+        trials = Trials(plan, store, backend or ThisMachine(), report)
         verdicts, confidences = _decide(trials, floor, confidence)
         contenders = [
             _contender(trials, named, content, verdicts[content], confidences[content])

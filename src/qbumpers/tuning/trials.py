@@ -9,7 +9,7 @@ import polars as pl
 
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan, estimated_seconds
-from qbumpers.experiments.run import Executor
+from qbumpers.experiments.run import Backend
 from qbumpers.experiments.store import EPISODES, Store
 
 
@@ -38,7 +38,7 @@ class Trials:
     Args:
         plan: the experiment, made ready.
         store: of the results.
-        executor: where to run.
+        backend: where to run.
         report: called with the progress at first and after each cell.
 
     Attributes:
@@ -49,13 +49,13 @@ class Trials:
     """
 
     def __init__(
-        self, plan: Plan, store: Store, executor: Executor, report: Callable[[TuningProgress], None]
+        self, plan: Plan, store: Store, backend: Backend, report: Callable[[TuningProgress], None]
     ) -> None:
         self.contents = list(plan.conditions)
         self.length = plan.experiment.trials
         self.raced = dict.fromkeys(self.contents, 0)
         self.fresh = dict.fromkeys(self.contents, 0)
-        self._plan, self._store, self._executor, self._report = plan, store, executor, report
+        self._plan, self._store, self._backend, self._report = plan, store, backend, report
         self._means = {c: np.full((2 * self.length, 2), np.nan) for c in self.contents}
         survey = store.survey(self.contents)
         self._cells = survey.cells
@@ -88,7 +88,7 @@ class Trials:
         missing = [cell for span in wanted for cell in gaps(span, self._cells[span.content], size)]
         rates = {cell.content: seconds for cell, seconds in self._seconds.items()}
         seconds = {cell: rates[cell.content] * cell.trials for cell in missing}
-        with contextlib.closing(self._executor(self._plan, seconds)) as work:
+        with contextlib.closing(self._backend(self._plan, seconds)) as work:
             for finished in work:
                 self._store.write(finished.cell, finished.files)
                 self._cells[finished.cell.content].append(finished.cell)

@@ -1,0 +1,168 @@
+"""Users' own rules and learners on their way to other processes, which register them there.
+
+A condition is pickled with what it needs of them, so that pools of processes and clusters can take
+conditions as they are.
+"""
+
+import functools
+import pickle
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from qbumpers.assistants import assistants, register_assistant
+from qbumpers.assistants.registry import Rule
+from qbumpers.compilation import compilation_settings, compiled_with, uncompiled
+from qbumpers.learners import LearnerType, learners, register_learner
+
+
+class _Function(NamedTuple):
+    """A user's function, and the settings that it was compiled with, if it was."""
+
+    source: Callable[..., Any]
+    settings: dict[str, Any] | None
+
+
+class _Registration(NamedTuple):
+    """What `register_assistant` or `register_learner` was told.
+
+    Attributes:
+        settings_type: options of a rule, settings of a learner.
+        functions: by parameter; None if it was not given. The rule itself is `decide`.
+        others: further arguments, by parameter.
+    """
+
+    settings_type: type
+    functions: dict[str, _Function | None]
+    others: dict[str, Any]
+
+
+class Own:
+    """Users' own rules and learners, packed; unpickling it registers them in that process.
+
+    Args:
+        rules: any; those of this package are left out.
+        kinds: of learners, likewise.
+    """
+
+    def __init__(self, rules: Iterable[Rule], kinds: Iterable[LearnerType]) -> None:
+        own = [each for each in (*rules, *kinds) if not each.built_in]
+        # Rules over rules come first and are registered last: they are compiled with others inside.
+        self.packed = tuple((type(each) is Rule, each.name, _packed(each)) for each in own[::-1])
+
+    def __reduce__(self) -> Any:
+        return _register_all, (self.packed,)
+
+
+def packed(conditions: Mapping[str, Any]) -> bytes:
+    """Pack conditions for a process that need not have the modules of users' rules and learners.
+
+    Args:
+        conditions: `qbumpers.simulation.Condition`s, by any name.
+
+    Returns:
+        Bytes, which `pickle.loads` unpacks in a process that has this package.
+    """
+    import cloudpickle
+
+    own = [
+        each
+        for condition in conditions.values()
+        for each in (*condition.assistant.chain, condition.learner_type)
+        if not each.built_in
+    ]
+    with _by_value({module for each in own for module in _modules(_registration(each))}):
+        return cloudpickle.dumps(dict(conditions))
+
+
+@functools.lru_cache(maxsize=256)
+def _packed(registered: Rule | LearnerType) -> bytes:
+    import cloudpickle
+
+    registration = _registration(registered)
+    with _by_value(_modules(registration)):
+        return cloudpickle.dumps(registration)
+
+
+def _registration(registered: Rule | LearnerType) -> _Registration:
+    rule = isinstance(registered, Rule)
+    functions = ("decide", "start", "observe") if rule else _LEARNER_FUNCTIONS
+    others = ("check_start", "needs", "values") if rule else ("observes",)
+    fresh: type = registered.options_type if rule else registered.settings_type
+    settings_type = fresh.__base__  # registering had made a fresh class of it
+    assert settings_type is not None
+    return _Registration(
+        settings_type,
+        {name: _taken_apart(getattr(registered, name)) for name in functions},
+        {name: getattr(registered, name) for name in others},
+    )
+
+
+_LEARNER_FUNCTIONS = ("start", "choose", "prefer", "policy", "learn", "begin")
+
+
+def _taken_apart(function: Callable[..., Any] | None) -> _Function | None:
+    if function is None:
+        return None
+    return _Function(uncompiled(function), compilation_settings(function))
+
+
+def _rebuilt(function: _Function | None) -> Any:
+    if function is None or function.settings is None:
+        return function and function.source
+    return compiled_with(function.source, function.settings)
+
+
+_received: dict[tuple[bool, str], tuple[bytes, Any]] = {}  # what came here, and what it became
+
+
+def _register_all(packed: tuple[tuple[bool, str, bytes], ...]) -> None:
+    for is_rule, name, content in packed:
+        known = assistants if is_rule else learners
+        before, became = _received.get((is_rule, name), (b"", None))
+        if before == content and known().get(name) is became:
+            continue  # compiled code can go on being used
+        _register(is_rule, name, pickle.loads(content))
+        _received[is_rule, name] = content, known()[name]
+
+
+def _register(is_rule: bool, name: str, told: _Registration) -> None:
+    functions = {each: _rebuilt(function) for each, function in told.functions.items()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # it was said where it was registered first
+        if is_rule:
+            decide = functions.pop("decide")
+            register_assistant(name, told.settings_type, **functions, **told.others)(decide)
+        else:
+            register_learner(name, told.settings_type, **functions, **told.others)
+
+
+def _modules(own: _Registration) -> list[str]:
+    """Modules that a user's rule or learner comes from, but for that of a script or notebook."""
+    sources = [f.source for f in own.functions.values() if f is not None]
+    parts = (own.settings_type, own.others.get("check_start"), *sources)
+    names = {part.__module__ for part in parts if part is not None}
+    package = __name__.partition(".")[0]
+    return sorted(
+        name
+        for name in names & sys.modules.keys() - {"__main__"}
+        if name.partition(".")[0] != package
+    )
+
+
+@contextmanager
+def _by_value(names: Iterable[str]) -> Iterator[None]:
+    """Within the block, what comes from these modules is pickled whole, not by its name."""
+    import cloudpickle
+
+    before = cloudpickle.list_registry_pickle_by_value()
+    modules = [sys.modules[name] for name in set(names) - before]
+    for module in modules:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        yield
+    finally:
+        for module in modules:
+            cloudpickle.unregister_pickle_by_value(module)
