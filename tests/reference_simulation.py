@@ -233,8 +233,7 @@ class ReferenceTrial:
         self.draw_from(seeded_bit_generators(seed, condition.learning(), trial))
         self.perception = perceived(condition.perception, condition.penalty)
         self.own_values = [
-            [float(self.learner.initial_value)] * self.task.actions
-            for _ in range(self.task.states)
+            [float(self.learner.initial_value)] * self.task.actions for _ in range(self.task.states)
         ]
         self.ahead = None  # (state, action) that a learner of SARSA has chosen already
         self.episodes, self.steps = [], []

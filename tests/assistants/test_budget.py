@@ -91,9 +91,7 @@ def test_a_budget_goes_to_other_processes(protocol, own_registry):
 
 def outcomes(assistant):
     """Trials that draw the same numbers, whatever the assistant."""
-    condition = make_condition(
-        cliff_walking(), assistant, episodes=12, common_random_numbers=True
-    )
+    condition = make_condition(cliff_walking(), assistant, episodes=12, common_random_numbers=True)
     return run(condition, trials=4, seed=3).outcomes
 
 

@@ -8,8 +8,8 @@ import pytest
 from qbumpers import RequestError, make_assistant, register_assistant
 from qbumpers.decisions import Decision, Noise
 from qbumpers.registration import File
-from tests.assistants.own_rules import NoOptions, full_budget, guide_within_budget, spend
 from tests.assistants.own_rules import BudgetOptions as OwnBudget
+from tests.assistants.own_rules import NoOptions, full_budget, guide_within_budget, spend
 from tests.assistants.situations import situation_of
 
 pytestmark = pytest.mark.usefixtures("own_registry")
@@ -117,6 +117,6 @@ def test_start_takes_the_model_too():
 
 def test_an_unknown_need_names_the_nearest():
     with pytest.raises(RequestError, match="'dynamic'.*did you mean 'dynamics'"):
-        register_assistant(
-            "own", OwnBudget, start=full_budget, observe=spend, needs=("dynamic",)
-        )(guide_within_budget)
+        register_assistant("own", OwnBudget, start=full_budget, observe=spend, needs=("dynamic",))(
+            guide_within_budget
+        )

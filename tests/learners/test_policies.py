@@ -92,7 +92,9 @@ def test_a_hand_with_a_single_action_cannot_slip():
 
 
 # Every value in a state is another, so that a target tells which action it was made of.
-TELLING = np.array([[0.0] * 4, [10.0, 20.0, 30.0, 40.0], [5.0, 6.0, 7.0, 8.0], [1.0, 2.0, 3.0, 4.0]])
+TELLING = np.array(
+    [[0.0] * 4, [10.0, 20.0, 30.0, 40.0], [5.0, 6.0, 7.0, 8.0], [1.0, 2.0, 3.0, 4.0]]
+)
 
 
 def taught(settings=Sarsa(discount=0.5), **changes):  # noqa: B008

@@ -10,7 +10,6 @@ from qbumpers.learners import (
     ExpectedSarsa,
     Motor,
     Perception,
-    QLearner,
     Sarsa,
     Schedule,
 )

@@ -95,7 +95,7 @@ def _compiled_declined(decision: Any, proposed: Any) -> Any:
 
 def _callable(rule: Rule, options: Any, function: Any) -> Any:
     """A function of a rule; for this session alone if a rule below is the user's or the same."""
-    if rule.built_in and not _all_built_in(options) or _is_below(rule, options):
+    if (rule.built_in and not _all_built_in(options)) or _is_below(rule, options):
         return _for_session(uncompiled(function), options)
     return function
 
