@@ -187,14 +187,14 @@ PERCEPTIONS = {
 def perceived(perception, penalty):
     """(notices, credits, penalty) of a perception or of the name of one."""
     if isinstance(perception, str):
-        notices, credits, disliked = PERCEPTIONS[perception]
-        return notices, credits, penalty if disliked else 0.0
+        notices, credit, disliked = PERCEPTIONS[perception]
+        return notices, credit, penalty if disliked else 0.0
     return perception.notices, perception.credits, perception.penalty
 
 
 def learned_from(perception, proposed, executed, undone, reward, coin):
     """(action, reward, whether it seemed to lead back) taken from a step; None for nothing."""
-    notices, credits, penalty = perception
+    notices, credit, penalty = perception
     if proposed == executed and not undone:
         return proposed, reward, False
     if not coin < notices:  # it looks like the learner's own doing
@@ -203,7 +203,7 @@ def learned_from(perception, proposed, executed, undone, reward, coin):
         "executed": (executed, reward - penalty, False),
         "proposed": (proposed, reward - penalty, undone),
         "nothing": None,
-    }[credits]
+    }[credit]
 
 
 def draw_index(probabilities, generator):

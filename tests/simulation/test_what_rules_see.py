@@ -27,8 +27,9 @@ COMFORT = np.random.default_rng(2).integers(0, 8, (48, 4)) / 8
 class Further:
     """Q* of the cliff, with further values in another order than rules ask for them."""
 
-    discount = 1.0
-    others = {"unused": None, "comfort": COMFORT.__getitem__, "safety": STEERED.__getitem__}
+    def __init__(self):
+        self.discount = 1.0
+        self.others = {"comfort": COMFORT.__getitem__, "safety": STEERED.__getitem__}
 
     def __call__(self, state):
         return CLIFF(state)
@@ -189,7 +190,7 @@ def test_undone_steps_of_the_wrapper_count_and_end_nothing():
     assert len(returned) == 101
     rows = [Step(**step[-1]["assistance"]) for step in returned[1:]]
     assert_never_arrived(Step(*(np.array(column) for column in zip(*rows, strict=True))))
-    observation, reward, terminated, truncated, info = returned[13]
+    reward, terminated, truncated = returned[13][1:4]
     assert (reward, terminated, truncated) == (99.0, False, False)
     summary = returned[-1][-1]["assisted_episode"]
     assert (summary["length"], summary["overrides"]) == (100, sum(s[1] == 99 for s in returned[1:]))
