@@ -1,11 +1,10 @@
-"""Rules, learners and trial a second time: plain Python, one number after the other.
+"""Learners and trial a second time: plain Python, one number after the other.
 
-Written from Algorithm 1 and Section 4.2 of the paper, and from Sutton and Barto, to be compared
+Written from Section 4.2 of the paper and from Sutton and Barto, to be compared
 with the package. It takes from the package only its containers of data (task, learner, situation)
 and the names of conditions.
 """
 
-import collections
 import hashlib
 import json
 from types import SimpleNamespace
@@ -13,122 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from qbumpers.decisions import Noise, Situation
-
-
-def replacement_value(values, second):
-    """Value of `AgentAction`."""
-    worse = [value for value in values if value < max(values)]
-    return max(worse) if second and worse else max(values)
-
-
-def one_of(values, target, tie):
-    """The action that `tie` in [0, 1) chooses among those of value `target`."""
-    equal = [action for action, value in enumerate(values) if value == target]
-    return equal[int(tie * len(equal))]
-
-
-def none(situation, noise):
-    return situation.proposed, 0.0
-
-
-def maximal(situation, noise):
-    values = list(situation.values)
-    if values[situation.proposed] == max(values):
-        return situation.proposed, 0.0
-    return one_of(values, max(values), noise.tie), 1.0
-
-
-def local_q_thresholding(situation, noise, alpha, second=False):
-    values = list(situation.values)
-    candidate = replacement_value(values, second)
-    shifted = [value - min(values) for value in values]
-    allowed = shifted[situation.proposed] >= (1 - alpha) * max(shifted)
-    if allowed or values[situation.proposed] >= candidate:
-        return situation.proposed, 0.0
-    return one_of(values, candidate, noise.tie), 1.0
-
-
-def logistic(ratio, p_max):
-    """f as odds: those of p_max at 1, their inverse at 0, geometric in between."""
-    with np.errstate(over="ignore"):
-        odds_against = np.float64((1 - p_max) / p_max) ** (2 * ratio - 1)
-        return float(1 / (1 + odds_against))
-
-
-def stochastic_q_bumpers(
-    situation, noise, alpha, v_min=0.0, p_max=0.999, second=False, escalate=True, clip=True
-):
-    values, proposed = list(situation.values), situation.proposed
-    earned, discount, start_value = situation.earned, situation.discount, situation.start_value
-    candidate = replacement_value(values, second)
-    if values[proposed] >= candidate:
-        return proposed, 0.0
-    lower_value = start_value - alpha * (start_value - v_min)
-    if escalate and earned + discount * candidate <= lower_value:
-        return one_of(values, max(values), noise.tie), 1.0
-    if alpha == 0:
-        probability = 1.0
-    else:
-        lost = start_value - (earned + discount * values[proposed])
-        ratio = lost / (alpha * (start_value - v_min))
-        certain = clip and not 0 < ratio < 1
-        probability = float(ratio >= 1) if certain else logistic(ratio, p_max)
-    overrides = noise.coin < probability
-    return (one_of(values, candidate, noise.tie) if overrides else proposed), probability
-
-
-def take_back(situation, noise, tolerance):
-    """An own rule of the tests: half of the proposals that give up too much are undone."""
-    values = list(situation.values)
-    if values[situation.proposed] >= max(values) - tolerance:
-        return situation.proposed, 0.0, False
-    return situation.proposed, 0.5, noise.coin < 0.5
-
-
-RULES = {
-    "none": none,
-    "maximal": maximal,
-    "local-q-thresholding": local_q_thresholding,
-    "stochastic-q-bumpers": stochastic_q_bumpers,
-    "take-back": take_back,
-}
-
-
-class PlainRule:
-    """A rule with its options; it never remembers anything."""
-
-    def __init__(self, name, **options):
-        self.name, self.options = name, options
-
-    def decide(self, situation, noise):
-        return RULES[self.name](situation, noise, **self.options)
-
-    def observe(self, step):
-        pass
-
-
-class PlainBudget:
-    """Another rule, until it has overridden so often in one episode."""
-
-    def __init__(self, of, per_episode):
-        self.of, self.per_episode = plain_rule(**of), per_episode
-        self.spent = collections.Counter()
-
-    def decide(self, situation, noise):
-        decision = self.of.decide(situation, noise)
-        if self.spent[situation.episode] < self.per_episode:
-            return decision
-        overrides = decision[0] != situation.proposed or True in decision[2:]
-        return (situation.proposed, 0.0) if overrides else decision
-
-    def observe(self, step):
-        self.of.observe(step)
-        self.spent[step.episode] += step.executed != step.proposed or step.undone
-
-
-def plain_rule(name, **options):
-    """The plain form of an assistant, as a file would describe it."""
-    return PlainBudget(**options) if name == "budget" else PlainRule(name, **options)
+from tests.reference_rules import one_of
 
 
 class _Words(np.random.bit_generator.ISeedSequence):
@@ -187,14 +71,14 @@ PERCEPTIONS = {
 def perceived(perception, penalty):
     """(notices, credits, penalty) of a perception or of the name of one."""
     if isinstance(perception, str):
-        notices, credits, disliked = PERCEPTIONS[perception]
-        return notices, credits, penalty if disliked else 0.0
+        notices, credit, disliked = PERCEPTIONS[perception]
+        return notices, credit, penalty if disliked else 0.0
     return perception.notices, perception.credits, perception.penalty
 
 
 def learned_from(perception, proposed, executed, undone, reward, coin):
     """(action, reward, whether it seemed to lead back) taken from a step; None for nothing."""
-    notices, credited, penalty = perception
+    notices, credit, penalty = perception
     if proposed == executed and not undone:
         return proposed, reward, False
     if not coin < notices:  # it looks like the learner's own doing
@@ -203,7 +87,7 @@ def learned_from(perception, proposed, executed, undone, reward, coin):
         "executed": (executed, reward - penalty, False),
         "proposed": (proposed, reward - penalty, undone),
         "nothing": None,
-    }[credited]
+    }[credit]
 
 
 def draw_index(probabilities, generator):

@@ -11,7 +11,7 @@ from qbumpers.simulation import Script, make_condition, record
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import solve
 from tests.golden.recording import COLUMNS, read_recording
-from tests.reference_simulation import stochastic_q_bumpers
+from tests.reference_rules import stochastic_q_bumpers
 
 
 def through_simulator(recording):

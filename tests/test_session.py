@@ -9,11 +9,11 @@ from qbumpers.session import ReplayError, Session, noise_of, replay, rows_of
 from qbumpers.simulation import record
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.dynamics import LIMIT, SUCCESS, TERMINATED, TRUNCATED
-from tests.assistants.own_rules import NoOptions
+from tests.assistants.own_rules import ABOVE_THE_GOAL, NoOptions, never_arrive
 from tests.shared_control_examples import CLIFF, DOWN, RIGHT, UP, bumpers, walking
 from tests.simulation.conditions import BUMPERS, on_the_cliff, taken_back
 
-START, ABOVE_THE_GOAL, GOAL = 36, 35, 47
+START, GOAL = 36, 47
 MODEL = Model(48, 0, 4, -1, 1.0, None, 1 - np.eye(4))
 HALF = Noise(0.5, 0.5)
 
@@ -148,13 +148,6 @@ def test_undone_steps_are_replayed(own_registry, stepper):
     assert steps.undone.any()
     session = session_of(condition.assistant, perceived="observant")
     assert replay(session, stepper, steps) == len(steps.episode)
-
-
-def never_arrive(situation, noise, options):
-    """Undo the step to the goal."""
-    if situation.state == ABOVE_THE_GOAL and situation.proposed == DOWN:
-        return Decision(situation.proposed, 1.0, True)
-    return Decision(situation.proposed, 0.0, False)
 
 
 def at_the_goal(perceived):

@@ -183,3 +183,22 @@ def test_noise_that_is_no_pairs_of_chances_is_refused(noise):
     environment = walking("none")
     with pytest.raises(RequestError, match=r"noise .*\[N, 2\].*\[0, 1\)"):
         environment.reset(options={"noise": noise})
+
+
+def test_recorded_noise_that_runs_out_is_an_error_and_no_step():
+    environment = walking("none")
+    environment.reset(options={"noise": [(0.5, 0.5), (0.25, 0.75)]})
+    environment.step(LEFT)
+    record = environment.step(LEFT)[-1]["assistance"]
+    assert (record["coin"], record["tie"]) == (0.25, 0.75)
+    with pytest.raises(RequestError, match=r"noise: .*run out before the episode ended"):
+        environment.step(LEFT)
+    environment.reset()  # fresh noise again
+    assert environment.step(LEFT)[-1]["assistance"]["reward"] == -1.0
+
+
+def test_no_recorded_noise_at_all_runs_out_at_once():
+    environment = walking("none")
+    environment.reset(options={"noise": []})
+    with pytest.raises(RequestError, match="run out"):
+        environment.step(LEFT)

@@ -202,7 +202,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._undo[1](before)
 
     def _shown(self, step: Step) -> Step:
-        """A record with values of its own, and actions as the environment numbers them."""
+        """A record of its own for the caller, with actions as the environment numbers them."""
         step, first = step._replace(values=step.values.copy()), self._first_action
         if not first:
             return step

@@ -8,7 +8,7 @@ from qbumpers.assistants.local_q_thresholding import (
     local_q_thresholding,
 )
 from qbumpers.decisions import Decision, Noise
-from tests import reference_simulation as plain
+from tests import reference_rules as plain
 from tests.assistants.situations import (
     assert_decides,
     assert_overrides_only_by_better,

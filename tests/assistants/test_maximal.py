@@ -2,7 +2,7 @@ from hypothesis import given
 
 from qbumpers.assistants.maximal import MaximalOptions, maximal
 from qbumpers.decisions import Decision
-from tests import reference_simulation as plain
+from tests import reference_rules as plain
 from tests.assistants.situations import (
     assert_decides,
     assert_overrides_only_by_better,

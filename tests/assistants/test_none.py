@@ -2,7 +2,7 @@ from hypothesis import given
 
 from qbumpers.assistants.none import NoneOptions, none
 from qbumpers.decisions import Decision
-from tests import reference_simulation as plain
+from tests import reference_rules as plain
 from tests.assistants.situations import assert_decides, noises, situations
 
 

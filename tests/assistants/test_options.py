@@ -99,14 +99,14 @@ def unpack_elsewhere(situation, noise, options):
 
 
 def test_a_rule_that_unpacks_a_situation_is_told_to_read_names():
-    with pytest.raises(RequestError, match="'own'.*by position; read them by name"):
+    with pytest.raises(RequestError, match=r"'own'.*by position; read them by name"):
         register_assistant("own", NoOptions)(mind_the_order)
 
 
 def test_a_rule_in_plain_python_that_unpacks_a_situation_is_told_too():
     with pytest.warns(UserWarning, match="'own' cannot be compiled"):
         register_assistant("own", NoOptions)(unpack_elsewhere)
-    with pytest.raises(RequestError, match="assistant own: .*by position; read them by name"):
+    with pytest.raises(RequestError, match=r"assistant own: .*by position; read them by name"):
         make_assistant("own").decide(situation_of([1.0, 2.0], 0), NOISE)
 
 
@@ -116,7 +116,7 @@ def test_start_takes_the_model_too():
 
 
 def test_an_unknown_need_names_the_nearest():
-    with pytest.raises(RequestError, match="'dynamic'.*did you mean 'dynamics'"):
+    with pytest.raises(RequestError, match=r"'dynamic'.*did you mean 'dynamics'"):
         register_assistant("own", OwnBudget, start=full_budget, observe=spend, needs=("dynamic",))(
             guide_within_budget
         )

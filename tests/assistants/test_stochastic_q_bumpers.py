@@ -12,7 +12,7 @@ from qbumpers.assistants.stochastic_q_bumpers import (
     stochastic_q_bumpers,
 )
 from qbumpers.decisions import Decision, Noise
-from tests import reference_simulation as plain
+from tests import reference_rules as plain
 from tests.assistants.situations import (
     PROBABILITY_TOLERANCE,
     assert_decides,

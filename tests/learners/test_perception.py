@@ -63,9 +63,9 @@ def test_who_credits_the_own_action_with_an_undone_step_believes_that_it_led_bac
 
 
 @pytest.mark.parametrize("coin", [0.0, 0.29, 0.3, 0.99])
-@pytest.mark.parametrize(("credits", "noticed"), [("executed", EXECUTED), ("nothing", -1)])
-def test_an_override_is_noticed_if_the_coin_falls_below_the_probability(coin, credits, noticed):
-    found = read(as_numbers(Perception(0.3, credits, PENALTY)), EXECUTED, coin=coin)
+@pytest.mark.parametrize(("credit", "noticed"), [("executed", EXECUTED), ("nothing", -1)])
+def test_an_override_is_noticed_if_the_coin_falls_below_the_probability(coin, credit, noticed):
+    found = read(as_numbers(Perception(0.3, credit, PENALTY)), EXECUTED, coin=coin)
     assert found.action == (noticed if coin < 0.3 else PROPOSED)
     assert found.reward == (REWARD - PENALTY if coin < 0.3 else REWARD)
 
@@ -88,14 +88,14 @@ def test_the_named_perceptions_are_the_plain_ones(name):
     penalty=amounts,
     coin=chances,
     notices=st.sampled_from([0.0, 0.3, 1.0]),
-    credits=st.sampled_from(["executed", "proposed", "nothing"]),
+    credit=st.sampled_from(["executed", "proposed", "nothing"]),
 )
 def test_compiled_and_interpreted_agree_with_the_plain_table(
-    proposed, executed, undone, reward, penalty, coin, notices, credits
+    proposed, executed, undone, reward, penalty, coin, notices, credit
 ):
     step = SimpleNamespace(proposed=proposed, executed=executed, undone=undone, reward=reward)
-    expected = learned_from((notices, credits, penalty), **vars(step), coin=coin)
-    numbers = as_numbers(Perception(notices, credits, penalty))
+    expected = learned_from((notices, credit, penalty), **vars(step), coin=coin)
+    numbers = as_numbers(Perception(notices, credit, penalty))
     for function in (perceive, perceive.py_func):
         found = function(numbers, **vars(step), coin=coin)
         if expected is None:

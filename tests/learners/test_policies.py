@@ -145,7 +145,7 @@ def test_sarsa_chooses_anew_if_the_state_is_another():
 
 @pytest.mark.parametrize("action", range(4))
 def test_sarsa_learns_from_the_next_action_that_a_record_tells(action):
-    settings, memory, chances = taught(next_action=action)
+    _, memory, chances = taught(next_action=action)
     assert memory.values[0, 2] == -1.0 + 0.5 * TELLING[1, action]
     assert drawn(chances) == drawn(stream())
 

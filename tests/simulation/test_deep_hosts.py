@@ -52,11 +52,11 @@ def test_the_wrapper_repeats_a_simulated_session(name, options):
 
 
 @pytest.mark.slow
-def test_people_learn_to_balance_a_pole():
-    """Random play and untrained people keep it up for 9 to 22 steps."""
+def test_learners_balance_a_pole():
+    """Random play and untrained learners keep it up for 9 to 22 steps."""
     network = Network((4,))
     unused = np.zeros(network.layout(4, 2).parameters())
-    person = DoubleDQN(
+    learner = DoubleDQN(
         network=Network((64, 64), "tanh"),
         batch_size=64,
         replay_size=100_000,
@@ -67,7 +67,7 @@ def test_people_learn_to_balance_a_pole():
         make_task("CartPole-v1", discount=0.99),
         "none",
         values=NetworkValues(network, 4, 2, unused, 0.99, "CartPole-v1", "zeros"),
-        learner=person,
+        learner=learner,
         episodes=250,
     )
     found = run(condition, trials=4).outcomes.unassisted_return

@@ -15,7 +15,8 @@ from qbumpers.learners import (
 )
 from qbumpers.simulation import Script, record, run
 from qbumpers.tasks import cliff_walking
-from tests.reference_simulation import ReferenceTrial, plain_rule
+from tests.reference_rules import plain_rule
+from tests.reference_simulation import ReferenceTrial
 from tests.simulation.conditions import (
     BUMPERS,
     THRESHOLDS,

@@ -64,6 +64,5 @@ def test_fewer_than_no_further_episodes_are_refused():
         make_condition(cliff_walking(), "none", retention=-1)
 
 
-def test_by_default_nobody_goes_on_alone():
-    assert on_the_cliff(BUMPERS).retention == 0
+def test_without_being_asked_nobody_goes_on_unassisted():
     assert run(on_the_cliff(BUMPERS), trials=1).outcomes.overrides.shape == (1, 12)

@@ -7,7 +7,7 @@ import pytest
 from qbumpers.assistants import register_assistant
 from qbumpers.decisions import Decision
 from qbumpers.simulation import run
-from tests import reference_simulation as plain
+from tests import reference_rules as plain
 from tests.assistants.own_rules import (
     BudgetOptions,
     NoOptions,
@@ -18,6 +18,7 @@ from tests.assistants.own_rules import (
     spend,
     watch,
 )
+from tests.reference_simulation import ReferenceTrial
 from tests.simulation.conditions import on_the_cliff
 
 pytestmark = pytest.mark.usefixtures("own_registry")
@@ -30,7 +31,7 @@ def assert_same(first, second):
 
 def plain_overrides(condition, rule, trials):
     references = [
-        plain.ReferenceTrial(condition, rule, seed=0, trial=trial).run() for trial in range(trials)
+        ReferenceTrial(condition, rule, seed=0, trial=trial).run() for trial in range(trials)
     ]
     return [[e["assisted_overrides"] for e in reference.episodes] for reference in references]
 
@@ -90,7 +91,7 @@ class PlainBudget:
 def assert_spent_as_planned(condition, outcomes, budget):
     for trial in range(len(outcomes.overrides)):
         rule = PlainBudget(budget)
-        reference = plain.ReferenceTrial(
+        reference = ReferenceTrial(
             condition, rule.decide, seed=0, trial=trial, observe=rule.observe
         ).run()
         for field in ("assisted_return", "unassisted_return", "overrides"):

@@ -94,10 +94,20 @@ def _compiled_declined(decision: Any, proposed: Any) -> Any:
 
 
 def _callable(rule: Rule, options: Any, function: Any) -> Any:
-    """A function of a rule; compiled for this session alone if a rule below it is the user's."""
-    if rule.built_in and not _all_built_in(options):
-        return _for_session(uncompiled(function))
+    """A function of a rule; for this session alone if a rule below is the user's or the same."""
+    if (rule.built_in and not _all_built_in(options)) or _is_below(rule, options):
+        return _for_session(uncompiled(function), options)
     return function
+
+
+def _is_below(rule: Rule, options: Any) -> bool:
+    """Whether a rule is over itself: compiled code that calls itself would never be inlined."""
+    nested = [kind for kind in options.types if isinstance(kind, types.NamedTuple)]
+    return any(
+        is_options(kind.instance_class)
+        and (rule_for_options(kind.instance_class) is rule or _is_below(rule, kind))
+        for kind in nested
+    )
 
 
 def _all_built_in(options: Any) -> bool:
@@ -107,4 +117,7 @@ def _all_built_in(options: Any) -> bool:
     return rule.built_in and all(map(_all_built_in, options.types))
 
 
-_for_session = functools.lru_cache(maxsize=256)(compiled_for_session)
+@functools.lru_cache(maxsize=256)
+def _for_session(function: Any, options: Any) -> Any:
+    """A function compiled for this session, another one for every type of options."""
+    return compiled_for_session(function)
