@@ -269,7 +269,7 @@ def small_tasks(assistant: Assistant, settings: Any = None) -> list[Task]:
 
 
 def small_values(task: Task, assistant: Assistant) -> Any:
-    """Values for one of the `small_tasks`, with the further rows that the assistant's rule named."""
+    """Values for one of the `small_tasks`, with the further rows that the rule named."""
     generator = np.random.default_rng(_SEED)
     if task.states:
         from qbumpers.values import solve

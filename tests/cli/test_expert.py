@@ -97,7 +97,7 @@ def test_an_expert_worse_than_random_is_warned_of(call):
         ((*POLE, "--hidden", "0"), "expert: network.hidden.0 = 0"),
         ((*POLE, "--activation", "elu"), "network.activation = 'elu'"),
         ((*POLE, "--learning-rate", "7"), "learning_rate = 7.0"),
-        ((*POLE, "--opening", "-1"), "opening = -1"),
+        ((*POLE, "--opening", "-1"), "random_start = -1"),
         ((*POLE, "--check", "absent.npz"), "absent.npz: there is none"),
         ((*POLE, "--figures", "drawn"), "--figures drawn: they are of a check"),
         (("Acrobot-v1", "--discount", "0.9", "--check", "pole.npz"), "of task CartPole-v1, 4"),

@@ -1,4 +1,4 @@
-"""The experts that ship, and a warning where values are no better than none."""
+"""The experts that ship, and a warning if values are no better than none."""
 
 import warnings
 
@@ -7,7 +7,7 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experts import ExpertWarning, check_expert
-from qbumpers.experts.checking import estimate
+from qbumpers.experts.checking import mean_with_error
 from qbumpers.tasks import make_task
 from qbumpers.values import shipped, shipped_expert
 from tests.values.networks import constant, network_of
@@ -43,10 +43,10 @@ def test_a_damaged_file_is_no_expert(folder):
         shipped_expert("corridor")
 
 
-def test_estimates_are_means_and_their_standard_errors():
+def test_means_come_with_their_standard_errors():
     numbers = np.array([1.0, 2.0, 6.0])
-    assert estimate(numbers) == pytest.approx((3.0, np.sqrt(7 / 3)))
-    assert estimate(numbers[:1]) == (1.0, np.inf)
+    assert mean_with_error(numbers) == pytest.approx((3.0, np.sqrt(7 / 3)))
+    assert mean_with_error(numbers[:1]) == (1.0, np.inf)
 
 
 def upright(observation):

@@ -5,8 +5,8 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experts import Recipe, choosing
-from qbumpers.experts.checking import Estimate
-from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_record
+from qbumpers.experts.checking import MeanWithError
+from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
 from qbumpers.learners import DoubleDQN, Schedule
 from qbumpers.networks import Network
 from qbumpers.tasks import make_task
@@ -18,8 +18,8 @@ RECIPE = Recipe(DoubleDQN(Network((4,)), discount=DISCOUNT, learning_starts=20),
 
 
 def judged(*merits):
-    nothing = Estimate(0.0, 0.0)
-    return Judgement(tuple(Estimate(m, 0.1) for m in merits), nothing, nothing, nothing, None)
+    nothing = MeanWithError(0.0, 0.0)
+    return Judgement(tuple(MeanWithError(m, 0.1) for m in merits), nothing, nothing, nothing, None)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_damaged_file_is_named(tmp_path):
 
 
 def test_the_provenance_says_how_it_was_chosen_and_what_it_reaches(tmp_path):
-    values = with_record(line(), constant(1, 2, 2), judged(1, 0.93, 0.5), [0, 1])
+    values = with_provenance(line(), constant(1, 2, 2), judged(1, 0.93, 0.5), [0, 1])
     values.save(tmp_path / "expert.npz")
     assert load_values(tmp_path / "expert.npz").method == (
         "by hand; the best of seeds 0, 1; success 1.00 at epsilon 0.02, 0.93 at epsilon 0.1, "

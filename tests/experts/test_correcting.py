@@ -7,12 +7,12 @@ from qbumpers.errors import RequestError
 from qbumpers.experts import correcting, visiting
 from qbumpers.experts.correcting import (
     Samples,
-    evaluated,
+    correct_values,
+    fit_correction,
     fit_of,
-    fitted,
     sample_returns,
 )
-from qbumpers.experts.visiting import visit
+from qbumpers.experts.visiting import visited_episodes
 from qbumpers.networks import Network
 from qbumpers.values import NetworkValues
 from tests.values.walking import DISCOUNT, GOAL, exact, line, worth
@@ -37,7 +37,7 @@ def quick(monkeypatch):
 def test_corrected_values_claim_what_is_achieved_and_keep_the_policy(quick):
     values = righteous()
     done = []
-    found = evaluated(line(), values, branches=300, learners=2, report=done.append)
+    found = correct_values(line(), values, branches=300, learners=2, report=done.append)
     assert done == list(range(1, 301))
     truth = np.array([worth(place) for place in range(1, GOAL)])
     assert np.abs(values(PLACES)[:, 1] - truth).min() > 20
@@ -51,7 +51,7 @@ def test_corrected_values_claim_what_is_achieved_and_keep_the_policy(quick):
 
 def test_samples_are_what_the_greedy_policy_achieves(quick):
     task, values = line(), righteous()
-    visited = visit(task, values, 1, 0)
+    visited = visited_episodes(task, values, 1, 0)
     assert len(visited) == 40
     samples = sample_returns(task, values, visited, 50, 0, lambda _: None)
     assert samples.tried.sum() == 50
@@ -69,7 +69,7 @@ def test_a_correction_is_the_same_for_every_action(monkeypatch, network):
     values = righteous(network)
     returns = np.linspace(-100, 10, 9)
     samples = Samples(PLACES, np.ones(9, int), returns, np.arange(9), np.ones(9, bool))
-    corrected = fitted(values, samples, 0)
+    corrected = fit_correction(values, samples, 0)
     added = corrected(PLACES) - values(PLACES)
     assert added[:, 0] == pytest.approx(added[:, 1], rel=1e-5)
     assert np.ptp(added[:, 0]) > 1
@@ -82,7 +82,7 @@ def test_a_fit_is_by_means_not_by_medians(monkeypatch):
     state = np.tile(np.array([[5, 1]], np.float32), (4, 1))
     returns = np.array([100.0, 100.0, 100.0, -100.0])
     samples = Samples(state, np.ones(4, int), returns, np.arange(4), np.ones(4, bool))
-    assert fitted(righteous(), samples, 0)(state[0])[1] == pytest.approx(50, abs=5)
+    assert fit_correction(righteous(), samples, 0)(state[0])[1] == pytest.approx(50, abs=5)
 
 
 def test_errors_are_over_visited_episodes():
@@ -98,10 +98,10 @@ def test_errors_are_over_visited_episodes():
 
 def test_a_dueling_network_is_refused():
     with pytest.raises(RequestError, match="a dueling network; only plain ones"):
-        evaluated(line(), righteous(Network((4,), dueling=3)))
+        correct_values(line(), righteous(Network((4,), dueling=3)))
 
 
 @pytest.mark.parametrize(("field", "value"), [("branches", 9), ("learners", 0), ("seed", -1)])
 def test_numbers_out_of_range_are_named(field, value):
     with pytest.raises(RequestError, match=rf"{field} = {value}.*needed"):
-        evaluated(line(), righteous(), **{field: value})
+        correct_values(line(), righteous(), **{field: value})

@@ -7,11 +7,11 @@ import pytest
 from qbumpers.errors import RequestError
 from qbumpers.experts.episodes import (
     discounted_return,
-    following,
+    epsilon_greedy,
     greedy,
     play,
     play_several,
-    wavering,
+    replay_then,
 )
 from qbumpers.tasks import make_task
 from tests.values.networks import network_of
@@ -41,9 +41,9 @@ def test_a_prefix_repeats_what_happened_and_then_others_decide(task):
     stepper = task.make_stepper()
     generator = np.random.default_rng(1)
     first = play(task, stepper, lambda o, t: int(generator.integers(2)), 0.5)
-    again = play(task, stepper, following(first.actions, lambda o, t: 0), 0.5)
+    again = play(task, stepper, replay_then(first.actions, lambda o, t: 0), 0.5)
     assert np.array_equal(again.observations, first.observations)
-    parted = play(task, stepper, following(first.actions[:4], lambda o, t: 1), 0.5)
+    parted = play(task, stepper, replay_then(first.actions[:4], lambda o, t: 1), 0.5)
     assert np.array_equal(parted.observations[:5], first.observations[:5])
     assert (parted.actions[4:] == 1).all()
 
@@ -54,17 +54,17 @@ def test_the_step_limit_truncates_and_is_no_end(task):
     assert (len(episode.actions), episode.terminated) == (7, False)
 
 
-def test_greedy_actions_are_best_and_openings_random(task):
+def test_greedy_actions_are_best_and_starts_random(task):
     values = network_of(inputs=4)
     for episode in play_several(task, values, 3, seed=2):
         assert np.array_equal(episode.actions, values(episode.observations[:-1]).argmax(axis=1))
-    opened = [e.actions[:5].tolist() for e in play_several(task, values, 20, opening=5)]
-    assert len({tuple(actions) for actions in opened}) > 10
+    starts = [e.actions[:5].tolist() for e in play_several(task, values, 20, random_start=5)]
+    assert len({tuple(actions) for actions in starts}) > 10
 
 
 def test_random_actions_come_as_often_as_asked_for():
     generator = np.random.default_rng(4)
-    policy = wavering(lambda o, t: 0, 0.3, 3, generator, opening=100)
+    policy = epsilon_greedy(lambda o, t: 0, 0.3, 3, generator, random_start=100)
     chosen = np.array([policy(np.zeros(1), step) for step in range(5100)])
     assert np.bincount(chosen[:100]).min() > 20
     assert (chosen[100:] == 0).mean() == pytest.approx(0.8, abs=0.03)
@@ -87,7 +87,7 @@ def test_discounted_returns_weigh_by_powers():
     assert discounted_return(np.array([1.0, 2.0, 4.0]), 0.5) == 3.0
 
 
-@pytest.mark.parametrize("field", ["episodes", "epsilon", "opening", "seed"])
+@pytest.mark.parametrize("field", ["episodes", "epsilon", "random_start", "seed"])
 def test_numbers_out_of_range_are_named(task, field):
     with pytest.raises(RequestError, match=rf"{field} = -1.*needed"):
         play_several(task, network_of(inputs=4), **{"episodes": 1, field: -1})

@@ -5,9 +5,10 @@ import hashlib
 import numpy as np
 
 from qbumpers.learners import DoubleDQN
-from qbumpers.learners.double_dqn import make_brain, rates, update
+from qbumpers.learners.double_dqn import make_memory, update
 from qbumpers.networks import Network
 from qbumpers.random_streams import LEARNER, trial_streams
+from qbumpers.registration import as_numbers
 
 INPUTS, ACTIONS, UPDATES = 8, 4, 200
 NETWORKS = [Network(), Network((40, 17), "relu", 33)]
@@ -17,14 +18,15 @@ def weights_after(network: Network, updates: int) -> bytes:
     """Weights after updates with batches from a replay of random transitions."""
     learner = DoubleDQN(network=network, replay_size=1_000, gradient_limit=0.5)
     layout = network.layout(INPUTS, ACTIONS)
-    brain = make_brain(learner, layout, trial_streams(0, "updates", range(1))[0, LEARNER])
+    memory = make_memory(learner, layout, trial_streams(0, "updates", range(1))[0, LEARNER])
     generator = np.random.default_rng(0)
-    brain.replay[:] = generator.normal(size=brain.replay.shape)
-    brain.replay[:, 2 * INPUTS] = generator.integers(ACTIONS, size=len(brain.replay))
-    brain.replay[:, -1] = 1.0
+    memory.replay[:] = generator.normal(size=memory.replay.shape)
+    memory.replay[:, 2 * INPUTS] = generator.integers(ACTIONS, size=len(memory.replay))
+    memory.replay[:, -1] = 1.0
+    settings = as_numbers(learner)
     for _ in range(updates):
-        update(layout, brain, rates(learner), generator.integers(1_000, size=learner.batch_size))
-    return brain.parameters.tobytes()
+        update(settings, memory, generator.integers(1_000, size=learner.batch_size))
+    return memory.parameters.tobytes()
 
 
 if __name__ == "__main__":

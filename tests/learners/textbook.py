@@ -46,17 +46,17 @@ class TextbookNetwork:
 
 
 def double_dqn_loss(online, target, transitions, discount):
-    """Mean Huber loss of width 1; transitions are rows as the replay of a `Brain` has them."""
+    """Mean Huber loss of width 1; transitions are rows as the replay of a `DQNMemory` has them."""
     rows = torch.as_tensor(np.asarray(transitions, np.float64))
     width = (rows.shape[1] - 3) // 2
-    now, following = rows[:, :width], rows[:, width : 2 * width]
+    observations, next_observations = rows[:, :width], rows[:, width : 2 * width]
     actions, rewards, going_on = rows[:, 2 * width].long(), rows[:, -2], rows[:, -1]
     with torch.no_grad():
-        preferred = online(following).argmax(dim=1, keepdim=True)
-        future = target(following).gather(1, preferred)[:, 0]
-        wanted = rewards + discount * going_on * future
-    values = online(now).gather(1, actions[:, None])[:, 0]
-    return torch.nn.functional.smooth_l1_loss(values, wanted)
+        preferred = online(next_observations).argmax(dim=1, keepdim=True)
+        future = target(next_observations).gather(1, preferred)[:, 0]
+        targets = rewards + discount * going_on * future
+    values = online(observations).gather(1, actions[:, None])[:, 0]
+    return torch.nn.functional.smooth_l1_loss(values, targets)
 
 
 class TextbookLearner:

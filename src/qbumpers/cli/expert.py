@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from qbumpers.experts import Recipe
-    from qbumpers.experts.checking import Estimate
+    from qbumpers.experts.checking import MeanWithError
     from qbumpers.experts.choosing import Judgement
     from qbumpers.tasks import TabularTask, Task
     from qbumpers.tasks.vector import VectorTask
@@ -59,8 +59,14 @@ def expert(
         str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")
     ] = "64,64",
     learning_rate: Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")] = 5e-4,
-    opening: Annotated[
-        int, typer.Option(help="Random actions before each episode of training.", metavar="N")
+    random_start: Annotated[
+        int,
+        typer.Option(
+            "--random-start",
+            "--opening",
+            help="Random actions before each episode of training.",
+            metavar="N",
+        ),
     ] = 50,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
@@ -88,14 +94,14 @@ def expert(
         if check is not None:
             _check(made, check, figures)
         else:
-            recipe = _recipe(made, steps, activation, hidden, learning_rate, opening)
+            recipe = _recipe(made, steps, activation, hidden, learning_rate, random_start)
             _train(made, recipe, list(range(seeds)), path)
         if corrected is not None:
             _correct(made, check or path, corrected)
 
 
 def _recipe(
-    task: "VectorTask", steps: int, activation: str, hidden: str, rate: float, opening: int
+    task: "VectorTask", steps: int, activation: str, hidden: str, rate: float, random_start: int
 ) -> "Recipe":
     from qbumpers.errors import checked
     from qbumpers.experts import Recipe
@@ -112,11 +118,11 @@ def _recipe(
         "learning_rate": rate,
         "discount": task.discount,
     }
-    return Recipe(checked(type(Recipe().learner), learner, "expert"), steps, opening)
+    return Recipe(checked(type(Recipe().learner), learner, "expert"), steps, random_start)
 
 
 def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
-    from qbumpers.experts.choosing import best, judge, train_several, with_record
+    from qbumpers.experts.choosing import best, judge, train_several, with_provenance
 
     work = path.with_name(f"{path.name}.work")
     with _steps_bar() as bar:
@@ -130,7 +136,7 @@ def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -
     with OUTPUT.status("judging"):
         judgements = [judge(task, values) for values in trained]
     chosen = best(judgements)
-    kept = with_record(task, trained[chosen], judgements[chosen], seeds)
+    kept = with_provenance(task, trained[chosen], judgements[chosen], seeds)
     kept.save(path)
     OUTPUT.print(_judgements(task, seeds, judgements))
     warn_of_bad_values(task, kept)
@@ -181,7 +187,7 @@ def _judgements(task: "VectorTask", names: list[Any], judgements: "list[Judgemen
     return listing
 
 
-def _number(found: "Estimate", digits: int) -> str:
+def _number(found: "MeanWithError", digits: int) -> str:
     return f"{found.mean:.{digits}f}"
 
 
@@ -220,7 +226,7 @@ def _correct(task: "VectorTask", path: Path, out: Path) -> None:
     values = _network_of(task, path)
     with _steps_bar() as bar:
         shown = bar.add_task("trying actions where learners go", total=correcting.BRANCHES)
-        found = correcting.evaluated(
+        found = correcting.correct_values(
             task,
             values,
             branches=correcting.BRANCHES,
@@ -250,11 +256,11 @@ def _network_of(task: "VectorTask", path: Path) -> "NetworkValues":
     return values
 
 
-def _signed(found: "Estimate") -> str:
+def _signed(found: "MeanWithError") -> str:
     return f"{found.mean:+.1f} \N{PLUS-MINUS SIGN} {1.96 * found.error:.1f}"
 
 
-def _with_error(found: "Estimate") -> str:
+def _with_error(found: "MeanWithError") -> str:
     return _signed(found).removeprefix("+")
 
 

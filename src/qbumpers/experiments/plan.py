@@ -122,14 +122,9 @@ def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     estimates = {}
     for cell in cells:
         condition = plan.conditions[cell.content]
-<<<<<<< HEAD
-        tabular = isinstance(condition.task, TabularTask)
+        tabular = condition.task.states > 0
         alike = (condition.assistant.name, condition.learner_type.name)
         alike = alike if tabular else condition.learner
-=======
-        tabular = condition.task.states > 0
-        alike = condition.assistant.name if tabular else condition.learner
->>>>>>> tasks1
         if alike not in seconds:
             measure = _seconds_a_trial if tabular else _seconds_a_deep_trial
             seconds[alike] = measure(condition, plan.experiment.seed)

@@ -14,13 +14,8 @@ from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load
-<<<<<<< HEAD
 from qbumpers.simulation import record
-from qbumpers.tasks import TabularTask, Task
-=======
-from qbumpers.simulation import Steps, record
 from qbumpers.tasks import Task
->>>>>>> tasks1
 from qbumpers.tasks.dynamics import TERMINATED
 
 INFOS = ("proposed", "credited", "overridden", "probability", "coin", "tie", "values",
@@ -102,17 +97,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
             raise RequestError(f"dataset = {dataset!r}: {error}") from error
 
 
-<<<<<<< HEAD
-def _observation_space(task: Task) -> gymnasium.Space[Any]:
-    if isinstance(task, TabularTask):
-        return gymnasium.spaces.Discrete(task.states)
-    return gymnasium.spaces.Box(-np.inf, np.inf, (task.observation_size,), np.float32)
-
-
 def _episodes(trial: int, steps: Step) -> Iterator[dict[str, Any]]:
-=======
-def _episodes(trial: int, steps: Steps) -> Iterator[dict[str, Any]]:
->>>>>>> tasks1
     """The fields of Minari's buffers, an episode each."""
     ends = [*(np.flatnonzero(np.diff(steps.episode)) + 1), len(steps.episode)]
     for first, end in itertools.pairwise([0, *ends]):

@@ -15,7 +15,7 @@ class ExpertWarning(UserWarning):
     """The assistant's action values are no better than no values."""
 
 
-class Estimate(NamedTuple):
+class MeanWithError(NamedTuple):
     """A mean over episodes and its standard error, infinite for a single episode."""
 
     mean: float
@@ -30,8 +30,8 @@ class ExpertCheck(NamedTuple):
         random: of uniformly random actions.
     """
 
-    expert: Estimate
-    random: Estimate
+    expert: MeanWithError
+    random: MeanWithError
 
     @property
     def better(self) -> bool:
@@ -39,20 +39,20 @@ class ExpertCheck(NamedTuple):
         return self.expert.mean > self.random.mean
 
 
-def estimate(numbers: np.ndarray) -> Estimate:
+def mean_with_error(numbers: np.ndarray) -> MeanWithError:
     """Mean and standard error of independent numbers [N]."""
     count = len(numbers)
     error = float(np.std(numbers, ddof=1)) / math.sqrt(count) if count > 1 else math.inf
-    return Estimate(float(np.mean(numbers)), error)
+    return MeanWithError(float(np.mean(numbers)), error)
 
 
 def check_expert(
     task: VectorTask, values: QValues, *, episodes: int = 20, epsilon: float = 0.02, seed: int = 0
 ) -> ExpertCheck:
-    """Hold greedy play by action values against random play; warn where it is no better.
+    """Compare greedy play by action values with random play; warn if it is no better.
 
     Args:
-        task: the task.
+        task: what is played.
         values: of the expert.
         episodes: of each.
         epsilon: probability of a random action in the expert's episodes.
@@ -65,24 +65,24 @@ def check_expert(
         RequestError: as `play_several`.
 
     Warns:
-        ExpertWarning: where the expert's mean return is not above that of random actions.
+        ExpertWarning: if the expert's mean return is not above that of random actions.
     """
     returns = [
-        estimate(
+        mean_with_error(
             np.array(
                 [
                     played.rewards.sum()
-                    for played in play_several(task, values, episodes, epsilon=share, seed=seed)
+                    for played in play_several(task, values, episodes, epsilon=chance, seed=seed)
                 ]
             )
         )
-        for share in (epsilon, 1.0)
+        for chance in (epsilon, 1.0)
     ]
     found = ExpertCheck(*returns)
     if not found.better:
         warnings.warn(
-            f"values of task {task.name}: their greedy policy returns {found.expert.mean:.1f} an "
-            f"episode and random actions {found.random.mean:.1f}, so assistance by them steers "
+            f"values of task {task.name}: their greedy policy returns {found.expert.mean:.1f} "
+            f"per episode and random actions {found.random.mean:.1f}, so assistance by them steers "
             "towards worse actions, and results say nothing about the method",
             ExpertWarning,
             stacklevel=2,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.errors import RequestError
-from qbumpers.experts.checking import Estimate, estimate
+from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, discounted_return, play_several
 from qbumpers.experts.training import Recipe, train_expert
 from qbumpers.random_streams import content_digest
@@ -17,10 +17,10 @@ from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import load_values
 
 SETTINGS = ((0.02, 0), (0.1, 0), (0.02, 50))
-"""Probability of a random action and random opening actions of the episodes that judge, in turn."""
+"""Epsilon and random actions at the start of the episodes that judge, in turn."""
 
 EPISODES = 100
-"""Of each setting."""
+"""That judge, of each setting."""
 
 
 class Judgement(NamedTuple):
@@ -28,26 +28,26 @@ class Judgement(NamedTuple):
 
     Attributes:
         merits: in the episodes of each of `SETTINGS`, the share of successes, or the mean return
-            where the task tells no success.
+            if the task tells no success.
         greedy_return: undiscounted, of greedy episodes.
         start_value: V(s_0).
         start_return: discounted return of greedy episodes.
-        crash_value: mean Q of the action that crashed, in the episodes that judge; None where
+        crash_value: mean Q of the action that crashed, in the episodes that judge; None if
             nothing crashed.
     """
 
-    merits: tuple[Estimate, ...]
-    greedy_return: Estimate
-    start_value: Estimate
-    start_return: Estimate
-    crash_value: Estimate | None
+    merits: tuple[MeanWithError, ...]
+    greedy_return: MeanWithError
+    start_value: MeanWithError
+    start_return: MeanWithError
+    crash_value: MeanWithError | None
 
 
 def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
     """Judge an expert.
 
     Args:
-        task: the task.
+        task: what it is to be good at.
         values: of the expert.
         episodes: of each setting, at least 1.
 
@@ -55,30 +55,30 @@ def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) 
         The judgement; equal values are judged alike.
     """
     played = [
-        play_several(task, values, episodes, epsilon=epsilon, opening=opening)
-        for epsilon, opening in SETTINGS
+        play_several(task, values, episodes, epsilon=epsilon, random_start=start)
+        for epsilon, start in SETTINGS
     ]
     plain = play_several(task, values, min(10, episodes))
     crashes = [episode for several in played for episode in several if episode.crash]
     returns = [discounted_return(episode.rewards, values.discount) for episode in plain]
     return Judgement(
         merits=tuple(_merit(task, several) for several in played),
-        greedy_return=estimate(np.array([episode.rewards.sum() for episode in plain])),
-        start_value=estimate(np.array([values(e.observations[0]).max() for e in plain])),
-        start_return=estimate(np.array(returns)),
+        greedy_return=mean_with_error(np.array([episode.rewards.sum() for episode in plain])),
+        start_value=mean_with_error(np.array([values(e.observations[0]).max() for e in plain])),
+        start_return=mean_with_error(np.array(returns)),
         crash_value=_last_value(values, crashes) if crashes else None,
     )
 
 
-def _merit(task: VectorTask, episodes: Iterable[Episode]) -> Estimate:
+def _merit(task: VectorTask, episodes: Iterable[Episode]) -> MeanWithError:
     if task.has_success:
-        return estimate(np.array([float(episode.success) for episode in episodes]))
-    return estimate(np.array([episode.rewards.sum() for episode in episodes]))
+        return mean_with_error(np.array([float(episode.success) for episode in episodes]))
+    return mean_with_error(np.array([episode.rewards.sum() for episode in episodes]))
 
 
-def _last_value(values: NetworkValues, episodes: Iterable[Episode]) -> Estimate:
+def _last_value(values: NetworkValues, episodes: Iterable[Episode]) -> MeanWithError:
     last = [values(episode.observations[-2])[episode.actions[-1]] for episode in episodes]
-    return estimate(np.array(last))
+    return mean_with_error(np.array(last))
 
 
 def best(judgements: Sequence[Judgement]) -> int:
@@ -97,7 +97,7 @@ def train_several(
     """Train an expert with each of several seeds; finished ones are kept and not trained again.
 
     Args:
-        task: the task.
+        task: what they are to be good at.
         recipe: of all of them.
         seeds: of the random numbers, not negative.
         folder: where each is kept.
@@ -107,7 +107,7 @@ def train_several(
         The experts, in the order of the seeds.
 
     Raises:
-        RequestError: as `train_expert`, and where a kept file is damaged.
+        RequestError: as `train_expert`, and if a kept file is damaged.
     """
     experts = []
     for seed in seeds:
@@ -115,10 +115,10 @@ def train_several(
         path = folder / f"seed-{seed}-{content[:12]}.npz"
         if not path.exists():
 
-            def tell(steps: int, seed: int = seed) -> None:
+            def report_steps(steps: int, seed: int = seed) -> None:
                 report(seed, steps)
 
-            train_expert(task, recipe, seed=seed, report=tell).save(path)
+            train_expert(task, recipe, seed=seed, report=report_steps).save(path)
         values = load_values(path)
         if not isinstance(values, NetworkValues):
             raise RequestError(f"{path}: a table of values; delete it, it is not of this training")
@@ -127,15 +127,15 @@ def train_several(
     return experts
 
 
-def with_record(
+def with_provenance(
     task: VectorTask, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
 ) -> NetworkValues:
     """The same values, with how they were chosen and what they reach in their provenance."""
     kind = "success" if task.has_success else "return"
     reached = ", ".join(
         f"{merit.mean:.2f} at epsilon {epsilon:g}"
-        + (f" after {opening} random actions" if opening else "")
-        for merit, (epsilon, opening) in zip(judgement.merits, SETTINGS, strict=True)
+        + (f" after {start} random actions" if start else "")
+        for merit, (epsilon, start) in zip(judgement.merits, SETTINGS, strict=True)
     )
     chosen = f"the best of seeds {', '.join(map(str, seeds))}; " if len(seeds) > 1 else ""
     return replace(values, method=f"{values.method}; {chosen}{kind} {reached}")

@@ -2,8 +2,8 @@
 
 Q-learning takes maxima of noisy values and sees few states off the expert's path, so its values are
 too high before crashes and other states that it seldom saw. Here states are gathered from learners
-and from a wavering expert, an action is tried in each, the expert's greedy policy plays on to the
-end, and a correction of each state is fitted to the discounted returns (fitted evaluation by Monte
+and from the expert with random actions, an action is tried in each, the expert's greedy policy plays
+on to the end, and a correction of each state is fitted to the discounted returns (fitted evaluation by Monte
 Carlo).
 """
 
@@ -13,14 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from qbumpers.compilation import compiled_apart
 from qbumpers.errors import RequestError
-from qbumpers.experts.checking import Estimate, estimate
-from qbumpers.experts.episodes import Episode, following, greedy, play
+from qbumpers.experts.checking import MeanWithError, mean_with_error
+from qbumpers.experts.episodes import Episode, greedy, play, replay_then
 from qbumpers.experts.quality import returns_to_go
-from qbumpers.experts.visiting import visit
-from qbumpers.learners.double_dqn import DoubleDQN, learn, make_brain, rates, remember
+from qbumpers.experts.visiting import visited_episodes
+from qbumpers.learners.double_dqn import DoubleDQN, DQNMemory, make_memory, remember, replay
+from qbumpers.learners.interface import Transition
 from qbumpers.networks.network import Layout, named_parameters
 from qbumpers.random_streams import LEARNER, trial_streams
+from qbumpers.registration import as_numbers
 from qbumpers.tasks.vector import VectorTask
 from qbumpers.values.network import NetworkValues
 
@@ -60,11 +63,11 @@ class Fit(NamedTuple):
         absolute: mean size of that.
     """
 
-    bias: Estimate
-    absolute: Estimate
+    bias: MeanWithError
+    absolute: MeanWithError
 
 
-class Evaluation(NamedTuple):
+class Correction(NamedTuple):
     """Corrected values, and how they compare to those they were made from.
 
     Attributes:
@@ -78,7 +81,7 @@ class Evaluation(NamedTuple):
     after: Fit
 
 
-def evaluated(
+def correct_values(
     task: VectorTask,
     values: NetworkValues,
     *,
@@ -86,14 +89,14 @@ def evaluated(
     learners: int = 4,
     seed: int = 0,
     report: Callable[[int], None] = lambda branches: None,
-) -> Evaluation:
+) -> Correction:
     """Correct action values by what their own greedy policy achieves where learners go.
 
     Args:
         task: the task.
         values: to be corrected.
         branches: states in which an action is tried, at least 10.
-        learners: that are simulated without help to visit states, at least 1.
+        learners: that are simulated unassisted to visit states, at least 1.
         seed: of the random numbers, not negative.
         report: called with the branches done.
 
@@ -101,7 +104,7 @@ def evaluated(
         Corrected values, and how good both are on every fifth visited episode, held out.
 
     Raises:
-        RequestError: where a number is out of range, or the network is a dueling one.
+        RequestError: if a number is out of range, or the network is a dueling one.
     """
     if values.network.dueling:
         raise RequestError(
@@ -112,12 +115,12 @@ def evaluated(
             f"branches = {branches}, learners = {learners}, seed = {seed}; at least 10, 1 and 0 "
             "are needed"
         )
-    visited = visit(task, values, learners, seed)
+    visited = visited_episodes(task, values, learners, seed)
     samples = sample_returns(task, values, visited, branches, seed, report)
     held_out = samples.episodes % _HELD_OUT == 0
-    corrected = fitted(values, _chosen(samples, ~held_out), seed)
+    corrected = fit_correction(values, _chosen(samples, ~held_out), seed)
     test = _chosen(samples, held_out & samples.tried)
-    return Evaluation(corrected, fit_of(values, test), fit_of(corrected, test))
+    return Correction(corrected, fit_of(values, test), fit_of(corrected, test))
 
 
 def _chosen(samples: Samples, which: np.ndarray) -> Samples:
@@ -143,7 +146,7 @@ def sample_returns(
         report: called with the branches done.
 
     Returns:
-        Samples of the tried actions and of some greedy ones later on, where their return is known.
+        Samples of the tried actions and of some greedy ones later on, if their return is known.
     """
     generator = np.random.default_rng([seed, 1])
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
@@ -154,7 +157,7 @@ def sample_returns(
         prefix = visited[which].actions[: place + 1].copy()
         if number % 2:
             prefix[place] = generator.integers(task.actions)
-        played = play(task, stepper, following(prefix, best), visited[which].chance)
+        played = play(task, stepper, replay_then(prefix, best), visited[which].chance)
         returns = returns_to_go(played.rewards, values.discount, played.terminated)
         later = generator.integers(place, len(returns), size=_KEPT).tolist()
         for step in {place, *later}:
@@ -165,7 +168,7 @@ def sample_returns(
     return Samples(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def fitted(values: NetworkValues, samples: Samples, seed: int) -> NetworkValues:
+def fit_correction(values: NetworkValues, samples: Samples, seed: int) -> NetworkValues:
     """The same values plus a correction of each state, fitted by least squares to returns.
 
     A correction of single actions would lose the policy: what is lost by one worse action is far
@@ -199,22 +202,32 @@ def fitted(values: NetworkValues, samples: Samples, seed: int) -> NetworkValues:
 
 
 def _regress(
-    values: NetworkValues, layout: Layout, observations: np.ndarray, wanted: np.ndarray, seed: int
+    values: NetworkValues, layout: Layout, observations: np.ndarray, targets: np.ndarray, seed: int
 ) -> np.ndarray:
     """Parameters of a network with one output, fitted to numbers by the compiled learner."""
     learner = DoubleDQN(
-        network=values.network, batch_size=_BATCH, clip="none", replay_size=len(wanted),
+        network=values.network, batch_size=_BATCH, clip="none", replay_size=len(targets),
         learning_starts=1,
     )  # fmt: skip
     stream = trial_streams(seed, ["fitted", values.digest()], range(1))[0, LEARNER]
-    brain = make_brain(learner, layout, stream)
-    for state, number in zip(observations, wanted, strict=True):
-        remember(brain, state, 0, number, state, True)  # nothing follows, so this is the target
+    memory = make_memory(learner, layout, stream)
+    _remember_all(memory, observations, targets)
     for rate in _RATES:
-        numbers = rates(learner._replace(learning_rate=rate))
-        for _ in range(_UPDATES):
-            learn(layout, brain, numbers, stream)
-    return brain.parameters
+        _replay_often(as_numbers(learner._replace(learning_rate=rate)), memory, stream, _UPDATES)
+    return memory.parameters
+
+
+@compiled_apart
+def _remember_all(memory: DQNMemory, observations: np.ndarray, targets: np.ndarray) -> None:
+    for n in range(len(targets)):
+        state = observations[n]  # nothing follows it, so the reward is the target
+        remember(memory, Transition(state, 0, targets[n], state, True, -1))
+
+
+@compiled_apart
+def _replay_often(settings: DoubleDQN, memory: DQNMemory, stream: np.ndarray, updates: int) -> None:
+    for _ in range(updates):
+        replay(settings, memory, stream)
 
 
 def _merge(
@@ -252,5 +265,8 @@ def fit_of(values: NetworkValues, samples: Samples) -> Fit:
     _, group = np.unique(samples.episodes, return_inverse=True)
     counts = np.bincount(group)
     return Fit(
-        *(estimate(np.bincount(group, weights) / counts) for weights in (errors, np.abs(errors)))
+        *(
+            mean_with_error(np.bincount(group, weights) / counts)
+            for weights in (errors, np.abs(errors))
+        )
     )

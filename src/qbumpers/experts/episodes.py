@@ -55,7 +55,7 @@ def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> E
     """Play an episode.
 
     Args:
-        task: the task.
+        task: what is played.
         stepper: its environment.
         policy: chooses the actions.
         chance: in [0, 1), for the environment; equal chance and actions give equal episodes.
@@ -64,7 +64,7 @@ def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> E
         The episode, up to the task's step limit.
 
     Raises:
-        RequestError: where an observation or a reward is not finite.
+        RequestError: if an observation or a reward is not finite.
     """
     observation = stepper.reset(chance)
     observations, actions, rewards, events = [observation], [], [], 0
@@ -104,7 +104,7 @@ def greedy(values: QValues, actions: int, generator: np.random.Generator) -> Pol
         generator: for ties.
 
     Returns:
-        The policy; it raises RequestError where values are not one finite number an action.
+        The policy; it raises RequestError if values are not one finite number per action.
     """
 
     def policy(observation: np.ndarray, step: int) -> int:
@@ -114,38 +114,42 @@ def greedy(values: QValues, actions: int, generator: np.random.Generator) -> Pol
     return policy
 
 
-def wavering(
-    policy: Policy, epsilon: float, actions: int, generator: np.random.Generator, opening: int = 0
+def epsilon_greedy(
+    greedy: Policy,
+    epsilon: float,
+    actions: int,
+    generator: np.random.Generator,
+    random_start: int = 0,
 ) -> Policy:
     """A policy whose actions are replaced by random ones now and then.
 
     Args:
-        policy: the policy.
+        greedy: decides otherwise.
         epsilon: probability of a random action.
         actions: A.
         generator: of the random actions.
-        opening: steps at the beginning of an episode that are all random.
+        random_start: steps at the beginning of an episode that are all random.
 
     Returns:
         The policy.
     """
 
-    def wavered(observation: np.ndarray, step: int) -> int:
-        if step < opening or generator.random() < epsilon:
-            return int(generator.integers(actions))
-        return policy(observation, step)
-
-    return wavered
-
-
-def following(prefix: Sequence[int] | np.ndarray, then: Policy) -> Policy:
-    """Repeats the actions of a prefix and goes on by another policy."""
-    recorded = np.asarray(prefix).tolist()
-
     def policy(observation: np.ndarray, step: int) -> int:
-        return recorded[step] if step < len(recorded) else then(observation, step)
+        if step < random_start or generator.random() < epsilon:
+            return int(generator.integers(actions))
+        return greedy(observation, step)
 
     return policy
+
+
+def replay_then(recorded: Sequence[int] | np.ndarray, policy: Policy) -> Policy:
+    """Repeats recorded actions, from the first step on, and goes on by a policy."""
+    actions = np.asarray(recorded).tolist()
+
+    def replaying(observation: np.ndarray, step: int) -> int:
+        return actions[step] if step < len(actions) else policy(observation, step)
+
+    return replaying
 
 
 def play_several(
@@ -154,29 +158,29 @@ def play_several(
     episodes: int,
     *,
     epsilon: float = 0.0,
-    opening: int = 0,
+    random_start: int = 0,
     seed: int = 0,
 ) -> list[Episode]:
     """Greedy episodes, each with random numbers of its own.
 
     Args:
-        task: the task.
+        task: what is played.
         values: Q* that decide.
         episodes: how many, at least 1.
         epsilon: probability of a random action instead.
-        opening: random actions at the beginning of each episode.
+        random_start: random actions at the beginning of each episode.
         seed: of the random numbers, not negative.
 
     Returns:
         The episodes; the first ones do not depend on how many follow.
 
     Raises:
-        RequestError: where a number is out of range, or values or observations are wrong.
+        RequestError: if a number is out of range, or values or observations are wrong.
     """
-    if episodes < 1 or opening < 0 or seed < 0 or not 0 <= epsilon <= 1:
+    if episodes < 1 or random_start < 0 or seed < 0 or not 0 <= epsilon <= 1:
         raise RequestError(
-            f"episodes = {episodes}, opening = {opening}, seed = {seed}, epsilon = {epsilon}; at "
-            "least 1, 0, 0 and a number in [0, 1] are needed"
+            f"episodes = {episodes}, random_start = {random_start}, seed = {seed}, epsilon = "
+            f"{epsilon}; at least 1, 0, 0 and a number in [0, 1] are needed"
         )
     stepper = task.make_stepper()
     played = []
@@ -184,7 +188,7 @@ def play_several(
         generator = np.random.default_rng([seed, number])
         chance = generator.random()
         policy = greedy(values, task.actions, generator)
-        policy = wavering(policy, epsilon, task.actions, generator, opening)
+        policy = epsilon_greedy(policy, epsilon, task.actions, generator, random_start)
         played.append(play(task, stepper, policy, chance))
     return played
 

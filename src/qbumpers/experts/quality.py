@@ -16,8 +16,8 @@ import polars as pl
 from scipy.spatial import KDTree
 
 from qbumpers.errors import RequestError
-from qbumpers.experts.checking import Estimate, estimate
-from qbumpers.experts.episodes import Episode, Policy, following, greedy, play, wavering
+from qbumpers.experts.checking import MeanWithError, mean_with_error
+from qbumpers.experts.episodes import Episode, Policy, epsilon_greedy, greedy, play, replay_then
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.vector import Stepper, VectorTask
 from qbumpers.values.exact import reachable_states, solve
@@ -26,7 +26,7 @@ from qbumpers.values.tabular import QValues, check_width
 BEFORE_CRASH = (1, 2, 3, 5, 10, 20, 40)
 """Steps before a crash that are looked at."""
 
-_REST = 0.01  # weight of what a truncation cut off, where it is small enough to be left out
+_NEGLIGIBLE = 0.01  # weight of what a truncation cut off that may be left out
 
 
 class Quality(NamedTuple):
@@ -37,17 +37,17 @@ class Quality(NamedTuple):
         start_return: discounted return of greedy episodes, of those that were not cut off early.
         bias: mean of Q(s, a) minus the return achieved, over states that the policies visited.
         absolute: mean size of that difference.
-        crash_value: mean Q of the very action that crashed; None where nothing did.
+        crash_value: mean Q of the very action that crashed; None if nothing did.
         crash_return: the reward it brought.
-        overestimated: share of claims above what was achieved.
+        overestimated: share of values above what was achieved.
     """
 
-    start_value: Estimate
-    start_return: Estimate
-    bias: Estimate
-    absolute: Estimate
-    crash_value: Estimate | None
-    crash_return: Estimate | None
+    start_value: MeanWithError
+    start_return: MeanWithError
+    bias: MeanWithError
+    absolute: MeanWithError
+    crash_value: MeanWithError | None
+    crash_return: MeanWithError | None
     overestimated: float
 
 
@@ -57,7 +57,7 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
     Args:
         rewards: float64 [T].
         discount: in (0, 1].
-        terminated: whether the episode ended for good. Where it was truncated, returns of which
+        terminated: whether the episode ended for good. If it was truncated, returns of which
             more than 1% hangs on what would have followed are unknown; nothing is bootstrapped.
 
     Returns:
@@ -69,18 +69,18 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
         returns[step] = total
     if not terminated:
         left = np.arange(len(rewards), 0, -1)
-        returns[discount**left > _REST] = np.nan
+        returns[discount**left > _NEGLIGIBLE] = np.nan
     return returns
 
 
 def default_policies(
     task: VectorTask, values: QValues, generator: np.random.Generator
 ) -> dict[str, Policy]:
-    """Policies that leave the expert's path: greedy with random actions of several shares."""
+    """Policies that leave the expert's path: greedy with several shares of random actions."""
     best = greedy(values, task.actions, generator)
     return {
-        f"{share:.0%} random": wavering(best, share, task.actions, generator)
-        for share in (0.1, 0.3, 1.0)
+        f"{epsilon:.0%} random": epsilon_greedy(best, epsilon, task.actions, generator)
+        for epsilon in (0.1, 0.3, 1.0)
     }
 
 
@@ -93,27 +93,27 @@ def check_values(
     episodes: int = 20,
     seed: int = 0,
 ) -> pl.DataFrame:
-    """Claims of action values and what is achieved, in states that policies visit.
+    """Compare action values with what is achieved, in states that policies visit.
 
     Args:
         task: the task.
-        values: any callable from an observation to a value an action.
+        values: any callable from an observation to a value per action.
         discount: of the values.
-        policies: that visit states, by name, for instance a learner's; where None, greedy ones with
+        policies: that visit states, by name, for instance a learner's; if None, greedy ones with
             10%, 30% and all actions random. "greedy" is always among them.
         episodes: of each policy, at least 2.
         seed: of the random numbers, not negative.
 
     Returns:
-        A row a claim: policy, episode, time (of the step, from 0), before_crash (steps until that
-        episode crashed, 1 for the step that did; null where it did not), distance (of the
+        A row per state and action that is compared: policy, episode, time (of the step, from 0), before_crash (steps until that
+        episode crashed, 1 for the step that did; null if it did not), distance (of the
         observation from the nearest one of greedy episodes, in standard deviations of visited
         observations), at_random (whether the state was picked so), value (claimed) and achieved
-        (null where truncation hides it). In each episode four states at random and those of
+        (null if truncation hides it). In each episode four states at random and those of
         `BEFORE_CRASH`, in greedy ones all.
 
     Raises:
-        RequestError: where a number is out of range, or values or observations are wrong.
+        RequestError: if a number is out of range, or values or observations are wrong.
     """
     if episodes < 2 or seed < 0 or not 0 < discount <= 1:
         raise RequestError(
@@ -128,7 +128,7 @@ def check_values(
     for number in range(episodes):
         played = play(task, stepper, best, generator.random())
         every = dict.fromkeys(range(len(played.actions)), True)
-        rows.append(_claims("greedy", number, played, played, every, values, discount))
+        rows.append(_comparisons("greedy", number, played, played, every, values, discount))
         path.append(played.observations)
     for name, policy in policies.items():
         for number in range(episodes):
@@ -136,7 +136,7 @@ def check_values(
             for place, at_random in _places(visited, generator).items():
                 achieved = branch(task, stepper, visited, place, best)
                 chosen = {place: at_random}
-                rows.append(_claims(name, number, visited, achieved, chosen, values, discount))
+                rows.append(_comparisons(name, number, visited, achieved, chosen, values, discount))
     found = pl.concat(rows)
     states = np.stack(found["observation"].to_list())
     distance = _distances(states, np.concatenate(path))
@@ -144,10 +144,10 @@ def check_values(
 
 
 def branch(
-    task: VectorTask, stepper: Stepper, visited: Episode, place: int, then: Policy
+    task: VectorTask, stepper: Stepper, visited: Episode, place: int, policy: Policy
 ) -> Episode:
     """Play an episode again up to and with step `place`, and go on by another policy."""
-    return play(task, stepper, following(visited.actions[: place + 1], then), visited.chance)
+    return play(task, stepper, replay_then(visited.actions[: place + 1], policy), visited.chance)
 
 
 def _places(visited: Episode, generator: np.random.Generator) -> dict[int, bool]:
@@ -158,7 +158,7 @@ def _places(visited: Episode, generator: np.random.Generator) -> dict[int, bool]
     return {place: place in picked for place in sorted(picked | late)}
 
 
-def _claims(
+def _comparisons(
     policy: str,
     number: int,
     visited: Episode,
@@ -193,21 +193,23 @@ def _distances(observations: np.ndarray, path: np.ndarray) -> np.ndarray:
     return KDTree(path / scale).query(observations / scale)[0]
 
 
-def summarise(claims: pl.DataFrame) -> Quality:
+def summarise(comparisons: pl.DataFrame) -> Quality:
     """The findings of a check in a few numbers.
 
     Args:
-        claims: from `check_values`.
+        comparisons: from `check_values`.
 
     Returns:
         The summary.
     """
-    known = claims.drop_nulls("achieved").with_columns(error=pl.col("value") - pl.col("achieved"))
+    known = comparisons.drop_nulls("achieved").with_columns(
+        error=pl.col("value") - pl.col("achieved")
+    )
     left = known.filter(pl.col("policy") != "greedy")
     visited, crashed = left.filter("at_random"), left.filter(before_crash=1)
-    first = claims.filter(policy="greedy", time=0)
+    first = comparisons.filter(policy="greedy", time=0)
     return Quality(
-        start_value=estimate(first["value"].to_numpy()),
+        start_value=mean_with_error(first["value"].to_numpy()),
         start_return=_over_episodes(known.filter(policy="greedy", time=0), "achieved"),
         bias=_over_episodes(visited, "error"),
         absolute=_over_episodes(visited.with_columns(pl.col("error").abs()), "error"),
@@ -219,25 +221,25 @@ def summarise(claims: pl.DataFrame) -> Quality:
     )
 
 
-def _over_episodes(rows: pl.DataFrame, column: str) -> Estimate:
+def _over_episodes(rows: pl.DataFrame, column: str) -> MeanWithError:
     """Mean over episodes, the independent unit, of their own means."""
     means = rows.group_by("policy", "episode").agg(pl.col(column).mean())[column].to_numpy()
-    return estimate(means) if len(means) else Estimate(np.nan, np.inf)
+    return mean_with_error(means) if len(means) else MeanWithError(np.nan, np.inf)
 
 
-def bias_by(claims: pl.DataFrame, column: str, edges: Sequence[float]) -> pl.DataFrame:
+def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> pl.DataFrame:
     """Bias of values within bins of another number.
 
     Args:
-        claims: from `check_values`.
+        comparisons: from `check_values`.
         column: for instance "distance", "time", "before_crash" or "value".
         edges: float [B + 1], ascending; a bin holds its lower edge but not its upper one.
 
     Returns:
-        A row a bin that has claims: low, high (its edges), value, achieved, bias and error (means
+        A row per bin that is not empty: low, high (its edges), value, achieved, bias and error (means
         over episodes, and the standard error of the bias), episodes.
     """
-    known = claims.drop_nulls(["achieved", column])
+    known = comparisons.drop_nulls(["achieved", column])
     rows = []
     for low, high in itertools.pairwise(edges):
         inside = known.filter((pl.col(column) >= low) & (pl.col(column) < high))
@@ -264,14 +266,14 @@ def check_table(task: TabularTask, values: QValues, *, discount: float) -> pl.Da
 
     Args:
         task: the task.
-        values: any callable from the number of a state to a value an action.
+        values: any callable from the number of a state to a value per action.
         discount: of the values.
 
     Returns:
-        A row a state that an episode can act in, and action: state, action, value, exact.
+        A row per state that an episode can act in and action: state, action, value, exact.
 
     Raises:
-        RequestError: where values are wrong or the exact ones do not exist.
+        RequestError: if values are wrong or the exact ones do not exist.
     """
     exact = solve(task, discount).table
     states = np.flatnonzero(reachable_states(task))

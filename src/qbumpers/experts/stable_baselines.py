@@ -27,7 +27,7 @@ def from_stable_baselines(model: Any, task: VectorTask) -> NetworkValues:
         The values, with the discount that the model was trained with.
 
     Raises:
-        RequestError: where Stable-Baselines3 is missing, the file is no DQN's, its network is not a
+        RequestError: if Stable-Baselines3 is missing, the file is no DQN's, its network is not a
             plain one of tanh or rectified linear units, or its spaces are not the task's.
     """
     try:

@@ -1,21 +1,23 @@
-"""Q* of a task with vector observations, learned by Double DQN without help (Section 4.3)."""
+"""Q* of a task with vector observations, learned unassisted by Double DQN (Section 4.3)."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from qbumpers.compilation import compiled_apart
+from qbumpers.compilation import compiled_apart, entered
 from qbumpers.errors import RequestError
-from qbumpers.learners.double_dqn import Brain, DoubleDQN, Rates, learn, make_brain, rates, remember
-from qbumpers.learners.q_learning import choose, scheduled
-from qbumpers.networks.network import Layout, values_of
+from qbumpers.learners.double_dqn import DoubleDQN, DQNMemory, choose, learn, make_memory
+from qbumpers.learners.interface import Rates, Transition
+from qbumpers.learners.schedules import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
+from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED, finite
 from qbumpers.tasks.vector import VectorTask
 from qbumpers.values.network import NetworkValues
 
 _REPORT_EVERY = 2_000  # steps
+_OLD_PENALTY = 1.0  # a learner had one when the seeds of published experts were drawn
 
 
 class Recipe(NamedTuple):
@@ -24,12 +26,12 @@ class Recipe(NamedTuple):
     Attributes:
         learner: the Double DQN; its schedule of epsilon runs over steps here, not episodes.
         steps: of training.
-        opening: random actions that every episode of training begins with.
+        random_start: random actions that every episode of training begins with.
     """
 
     learner: DoubleDQN = DoubleDQN(learning_rate=5e-4)
     steps: int = 400_000
-    opening: int = 50
+    random_start: int = 50
 
     def words(self, seed: int) -> str:
         """The recipe in a line, for the provenance of values."""
@@ -39,7 +41,7 @@ class Recipe(NamedTuple):
             f"Double DQN, {network.activation} {'-'.join(map(str, network.hidden))}{dueling}, "
             f"learning rate {self.learner.learning_rate:g}, {self.steps} steps, epsilon "
             f"{epsilon.start:g} to {epsilon.end:g} over {epsilon.fraction:.0%}, "
-            f"{self.opening} random actions before each episode, seed {seed}"
+            f"{self.random_start} random actions before each episode, seed {seed}"
         )
 
 
@@ -53,8 +55,8 @@ def train_expert(
     """Train an expert.
 
     Args:
-        task: the task.
-        recipe: how.
+        task: what it is to be good at.
+        recipe: how it is trained.
         seed: of all random streams, not negative.
         report: called now and then with the steps done.
 
@@ -62,25 +64,25 @@ def train_expert(
         The action values of the last step.
 
     Raises:
-        RequestError: where a number of the recipe is out of range, or the environment gives a
+        RequestError: if a number of the recipe is out of range, or the environment gives a
             number that is not finite.
     """
-    if recipe.steps < 1 or recipe.opening < 0 or seed < 0:
+    if recipe.steps < 1 or recipe.random_start < 0 or seed < 0:
         raise RequestError(
-            f"steps = {recipe.steps}, opening = {recipe.opening}, seed = {seed}; at least 1, 0 "
-            "and 0 are needed"
+            f"steps = {recipe.steps}, random_start = {recipe.random_start}, seed = {seed}; at "
+            "least 1, 0 and 0 are needed"
         )
     learner = recipe.learner
     layout = learner.network.layout(task.observation_size, task.actions)
-    content = ["train_expert", task.digest(), recipe]
+    content = ["train_expert", task.digest(), [[*learner, _OLD_PENALTY], *recipe[1:]]]
     streams = trial_streams(seed, content, range(1))[0]
-    brain = make_brain(learner, layout, streams[LEARNER])
-    _train(task, recipe, layout, brain, streams, report)
+    memory = make_memory(learner, layout, streams[LEARNER])
+    _train(task, recipe, memory, streams, report)
     return NetworkValues(
         network=learner.network,
         inputs=task.observation_size,
         actions=task.actions,
-        parameters=brain.parameters,
+        parameters=memory.parameters,
         discount=learner.discount,
         task=task.name,
         method=recipe.words(seed),
@@ -90,30 +92,35 @@ def train_expert(
 def _train(
     task: VectorTask,
     recipe: Recipe,
-    layout: Layout,
-    brain: Brain,
+    memory: DQNMemory,
     streams: np.ndarray,
     report: Callable[[int], None],
 ) -> None:
     stepper = task.make_stepper()
-    network = (tuple(layout), brain.parameters, np.zeros(layout.room(1), np.float32))
-    numbers, plain = tuple(rates(recipe.learner)), tuple(brain)
+    settings, schedule = as_numbers(recipe.learner), recipe.learner.epsilon
+    rates = Rates(1.0, recipe.learner.learning_rate)
     observation, length = stepper.reset(draw(streams[ENVIRONMENT])), 0
+    propose = entered(choose, settings, memory, observation, rates, streams[LEARNER])
+    take = entered(
+        _take, settings, memory, Transition(observation, 0, 0.0, observation, False, -1), rates,
+        streams[EVALUATION],
+    )  # fmt: skip
     for step in range(recipe.steps):
-        epsilon = scheduled(recipe.learner.epsilon, step, recipe.steps)
-        if length < recipe.opening:
+        epsilon = scheduled(schedule, step, recipe.steps)
+        if length < recipe.random_start:
             epsilon = 1.0
-        action = _choose(network, observation, epsilon, streams[LEARNER])
-        following, reward, event = stepper.step(action)
-        learned = _take(
-            network, plain, numbers, observation, action, reward, following, event, streams
+        action = propose(
+            settings, memory, observation, rates._replace(epsilon=epsilon), streams[LEARNER]
         )
-        if not learned:
+        next_observation, reward, event = stepper.step(action)
+        terminated = event & TERMINATED != 0
+        happened = Transition(observation, action, reward, next_observation, terminated, -1)
+        if not take(settings, memory, happened, rates, streams[EVALUATION]):
             raise RequestError(
-                f"task {task.name}: step {step + 1}: observation {following.tolist()}, reward "
-                f"{reward}; every number must be finite"
+                f"task {task.name}: step {step + 1}: observation {next_observation.tolist()}, "
+                f"reward {reward}; every number must be finite"
             )
-        observation, length = following, length + 1
+        observation, length = next_observation, length + 1
         if event & (TERMINATED | TRUNCATED) or length == task.episode_limit:
             observation, length = stepper.reset(draw(streams[ENVIRONMENT])), 0
         if (step + 1) % _REPORT_EVERY == 0:
@@ -121,19 +128,11 @@ def _train(
 
 
 @compiled_apart
-def _choose(network: Any, observation: np.ndarray, epsilon: float, stream: np.ndarray) -> int:
-    return choose(values_of(network, observation), epsilon, draw(stream), draw(stream))
-
-
-@compiled_apart
 def _take(
-    network: Any, brain: Any, numbers: Any, observation: np.ndarray, action: int, reward: float,
-    following: np.ndarray, event: int, streams: np.ndarray,
-) -> bool:  # fmt: skip
-    """Learn from a step; False where a number is not finite."""
-    sound = finite(reward, following)
+    settings: DoubleDQN, memory: DQNMemory, happened: Transition, rates: Rates, stream: np.ndarray
+) -> bool:
+    """Learn from a step; False if a number is not finite."""
+    sound = finite(happened.reward, happened.next_state)
     if sound:
-        terminated = event & TERMINATED != 0
-        remember(Brain(*brain), observation, action, reward, following, terminated)
-        learn(Layout(*network[0]), Brain(*brain), Rates(*numbers), streams[EVALUATION])
+        learn(settings, memory, happened, rates, stream)
     return sound

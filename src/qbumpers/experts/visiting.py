@@ -1,25 +1,30 @@
-"""States that learners see: episodes of people who learn alone, and of an expert that wavers."""
+"""States that learners see: episodes of unassisted learners and of an epsilon-greedy expert."""
 
 import numpy as np
 
-from qbumpers.experts.episodes import Episode, greedy, play, wavering
-from qbumpers.learners.double_dqn import Brain, DoubleDQN, learn, make_brain, rates, remember
-from qbumpers.learners.q_learning import choose, scheduled
-from qbumpers.networks.network import Layout, values_of
+from qbumpers.compilation import entered
+from qbumpers.experts.episodes import Episode, epsilon_greedy, greedy, play
+from qbumpers.learners.double_dqn import DoubleDQN, DQNMemory, choose, learn, make_memory
+from qbumpers.learners.interface import Rates, Transition
+from qbumpers.learners.schedules import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
+from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import TERMINATED
 from qbumpers.tasks.vector import Stepper, VectorTask
 from qbumpers.values.network import NetworkValues
 
 _EPISODES = 100  # of each learner
-_WAVERING = (0.1, 0.3, 0.6)  # shares of random actions
+_EPSILONS = (0.1, 0.3, 0.6)  # of the expert's episodes, in turn
+_LONGEST_START = 100  # random actions that every other one of them may begin with
 
 
-def visit(task: VectorTask, values: NetworkValues, learners: int, seed: int) -> list[Episode]:
-    """Episodes of learners without help, and as many of the wavering expert, shuffled.
+def visited_episodes(
+    task: VectorTask, values: NetworkValues, learners: int, seed: int
+) -> list[Episode]:
+    """Episodes of unassisted learners, and as many epsilon-greedy ones of the expert, shuffled.
 
     Args:
-        task: the task.
+        task: what is learned.
         values: of the expert.
         learners: how many, each from its first episode on.
         seed: of the random numbers, not negative.
@@ -31,23 +36,34 @@ def visit(task: VectorTask, values: NetworkValues, learners: int, seed: int) -> 
     visited = []
     for number in range(learners):
         streams = trial_streams(seed, ["evaluated", task.digest()], range(number, number + 1))[0]
-        visited += _practise(task, values.discount, streams)
+        visited += _learning_episodes(task, values.discount, streams)
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
     for number in range(len(visited)):
-        share = _WAVERING[number % len(_WAVERING)]
-        opening = int(generator.integers(100)) if number % 2 else 0
-        policy = wavering(best, share, task.actions, generator, opening)
+        epsilon = _EPSILONS[number % len(_EPSILONS)]
+        random_start = int(generator.integers(_LONGEST_START)) if number % 2 else 0
+        policy = epsilon_greedy(best, epsilon, task.actions, generator, random_start)
         visited.append(play(task, stepper, policy, generator.random()))
     return [visited[place] for place in generator.permutation(len(visited))]
 
 
-class _Practice:
-    """An environment that a learner learns in as it is stepped through."""
+class _LearningStepper:
+    """An environment whose every step a learner learns from.
 
-    def __init__(self, stepper: Stepper, layout: Layout, brain: Brain, learner: DoubleDQN) -> None:
-        self._stepper, self._layout, self._brain = stepper, layout, brain
-        self._rates = rates(learner)
-        self.streams: np.ndarray
+    Args:
+        stepper: the environment.
+        settings: of the learner, as numbers.
+        memory: of the learner.
+        stream: uint64 [4], random stream of its batches.
+    """
+
+    def __init__(
+        self, stepper: Stepper, settings: DoubleDQN, memory: DQNMemory, stream: np.ndarray
+    ) -> None:
+        self._stepper, self._learner = stepper, (settings, memory)
+        self._rest = (Rates(0.0, settings.learning_rate), stream)
+        nothing = np.zeros(memory.layout.sizes[0], np.float32)
+        example = Transition(nothing, 0, 0.0, nothing, False, -1)
+        self._learn = entered(learn, *self._learner, example, *self._rest)
 
     def reset(self, chance: float) -> np.ndarray:
         self._observation = self._stepper.reset(chance)
@@ -55,28 +71,28 @@ class _Practice:
 
     def step(self, action: int) -> tuple[np.ndarray, float, int]:
         observation, reward, event = self._stepper.step(action)
-        ended = event & TERMINATED != 0
-        remember(self._brain, self._observation, action, reward, observation, ended)
-        learn(self._layout, self._brain, self._rates, self.streams[EVALUATION])
+        terminated = event & TERMINATED != 0
+        happened = Transition(self._observation, action, reward, observation, terminated, -1)
+        self._learn(*self._learner, happened, *self._rest)
         self._observation = observation
         return observation, reward, event
 
 
-def _practise(task: VectorTask, discount: float, streams: np.ndarray) -> list[Episode]:
+def _learning_episodes(task: VectorTask, discount: float, streams: np.ndarray) -> list[Episode]:
     """Episodes of a learner from its first on."""
     learner = DoubleDQN(discount=discount)
     layout = learner.network.layout(task.observation_size, task.actions)
-    brain = make_brain(learner, layout, streams[LEARNER])
-    network = (tuple(layout), brain.parameters, np.zeros(layout.room(1), np.float32))
-    practice = _Practice(task.make_stepper(), layout, brain, learner)
-    practice.streams = streams
+    memory = make_memory(learner, layout, streams[LEARNER])
+    settings, rates = as_numbers(learner), Rates(1.0, learner.learning_rate)
+    stepper = _LearningStepper(task.make_stepper(), settings, memory, streams[EVALUATION])
+    nothing = np.zeros(task.observation_size, np.float32)
+    propose = entered(choose, settings, memory, nothing, rates, streams[LEARNER])
     episodes = []
     for number in range(_EPISODES):
-        epsilon = scheduled(learner.epsilon, number, _EPISODES)
+        now = rates._replace(epsilon=scheduled(learner.epsilon, number, _EPISODES))
 
-        def policy(observation: np.ndarray, _: int, epsilon: float = epsilon) -> int:
-            row = values_of(network, observation)
-            return choose(row, epsilon, draw(streams[LEARNER]), draw(streams[LEARNER]))
+        def policy(observation: np.ndarray, _: int, now: Rates = now) -> int:
+            return propose(settings, memory, observation, now, streams[LEARNER])
 
-        episodes.append(play(task, practice, policy, draw(streams[ENVIRONMENT])))
+        episodes.append(play(task, stepper, policy, draw(streams[ENVIRONMENT])))
     return episodes

@@ -263,18 +263,14 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
 
 
 @inlined
-def _fresh_memory(forgetting: float | None, settings: Any, shape: Shape, stream: Any) -> Any:
-    """A learner's first memory once more, if anything is to be forgotten."""
-    if forgetting is None:
-        return 0
-    return start_learner(settings, shape, stream.copy())
-
-
-@inlined
-def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
+def _forget(
+    forgetting: float | None, memory: Any, settings: Any, shape: Shape, stream: Any, episode: int
+) -> None:
+    """Move a memory towards a first one, between two episodes."""
     if forgetting is None:
         return
     if episode > 0:
+        fresh = start_learner(settings, shape, stream.copy())
         forget(memory, fresh, forgetting)
 
 
@@ -318,7 +314,6 @@ def run_trials(
     recorded = 0
     for trial in range(trials):
         _copy_streams(own, streams, trial, 0)
-        fresh = _fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
         held = start_learner(learner.settings, shape, own_streams[LEARNER])
         memory = borrow(held)
         rule_memory = start_rule(assistance.options, model)
@@ -326,7 +321,9 @@ def run_trials(
             if episode > 0 and streams.shape[1] > 1:
                 _copy_streams(own, streams, trial, episode)
             when = When(trial, episode, episode < training)
-            _forget(learner.forgetting, memory, fresh, episode)
+            _forget(
+                learner.forgetting, memory, learner.settings, shape, own_streams[LEARNER], episode
+            )  # fmt: skip
             rates = begin_learner(learner.settings, memory, episode, training)
             rule_memory, recorded = _assisted_episode(
                 dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,
