@@ -1,7 +1,7 @@
 """Every table of a report, from the trials of a run."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -11,7 +11,9 @@ from qbumpers.analysis.comparisons import RETURNS, advantages, against, methods,
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import summary, trial_samples
 from qbumpers.analysis.published import Comparison, compare, published_numbers
+from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import Experiment
+from qbumpers.experiments.learner_designs import written
 
 
 class LearnerFindings(NamedTuple):
@@ -91,7 +93,7 @@ def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
     Returns:
         The tables, without sentences.
     """
-    options = {n.condition: n.assistant.options._asdict() for n in experiment.conditions()}
+    options = {n.condition: _as_cells(n.assistant) for n in experiment.conditions()}
     table = summary(trials, options, experiment.episodes, experiment.retention)
     learners = [
         _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
@@ -107,6 +109,13 @@ def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
         comparisons=compare(printed, table, found.regrets),
         claims=judged(experiment.reproduces, trials, generator, paired),
     )
+
+
+def _as_cells(assistant: Assistant) -> dict[str, Any]:
+    """Options as a table can hold them: tuples and other assistants as ids write them."""
+    plain = (bool, int, float, str)
+    fields = assistant.options._asdict()
+    return {f: v if isinstance(v, plain) else written(v) for f, v in fields.items()}
 
 
 def _about(
