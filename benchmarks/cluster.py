@@ -14,7 +14,7 @@ from qbumpers.experiments.cluster import BATCH_SECONDS, LOCAL, RayCluster
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
 from qbumpers.experiments.run import Executor, run_experiment
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 
 _SMALL = 400  # cells of one trial
 

@@ -14,8 +14,8 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds, make_plan
 from qbumpers.experiments.run import Executor, run_experiment
-from qbumpers.experiments.sources import reproduction
 from qbumpers.experiments.work import Finished, finish
+from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import run
 
 UNIT = "million steps/s"

@@ -9,7 +9,7 @@ from pathlib import Path
 from measuring import Row, Target, Timed, alternate, compared, is_quick, seconds_of, show
 
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import run
 
 UNIT = "s"

@@ -17,16 +17,17 @@ import qbumpers
 from qbumpers import QLearner, Schedule, make_assistant, simulate
 from qbumpers.analysis.figures.curves import curves_figure, learning_curves
 from qbumpers.analysis.figures.style import NAMES, assistant_of, figure, looks, readable
+from qbumpers.analysis.findings import Findings
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import trial_measures, trial_samples
-from qbumpers.analysis.published import Comparison, published_numbers
-from qbumpers.analysis.report import Findings, write_report
-from qbumpers.analysis.section_4_1 import threshold_story
-from qbumpers.analysis.statistics import Estimate, mean_interval
+from qbumpers.analysis.statistics import IntervalEstimate, mean_interval
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experiments.store import Results, load
+from qbumpers.reproduction.cliff_walking.thresholds import summarise_thresholds
+from qbumpers.reproduction.experiments import profiles, reproduction
+from qbumpers.reproduction.printed import Comparison, compare, printed_numbers
+from qbumpers.reproduction.report import write_report
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import TabularValues
 
@@ -40,7 +41,7 @@ FIGURES = {
 NONE = "local-q-thresholding/alpha=1"
 THRESHOLDING = "local-q-thresholding/alpha=0.0195"
 LEARNING, PERFORMANCE = "stochastic-q-bumpers/alpha=0.7", "stochastic-q-bumpers/alpha=0.2"
-"""The points that the paper compares: no help, a baseline, and a method matched in each measure."""
+"""Points that the paper compares: no assistance, a baseline, a method matched in each measure."""
 
 
 class Outcome(NamedTuple):
@@ -48,11 +49,13 @@ class Outcome(NamedTuple):
 
     Attributes:
         findings: the tables of its report.
+        comparisons: printed numbers beside the measured ones.
         results: its files.
         means: unassisted and assisted means by condition, float64 [2].
     """
 
     findings: Findings
+    comparisons: list[Comparison]
     results: Results
     means: dict[str, np.ndarray]
 
@@ -80,7 +83,7 @@ def make(folder: Path) -> None:
         printed={axis: regret_of_points(printed_points(), axis) for axis in (0, 1)},
         own_points={axis: regret_of_points(figures.means, axis) for axis in (0, 1)},
         pooled={axis: pooled_regret(figures, axis) for axis in (0, 1)},
-        story=threshold_story(values.table, thresholds["alpha"].to_list()),
+        thresholds=summarise_thresholds(values.table, thresholds["alpha"].to_list()),
         changes=list(changes()),
         measure=measure,
     )
@@ -98,7 +101,10 @@ def _run(profile: str, images: Path) -> Outcome:
             shrink(copy)
         results = load(folder)
     samples = trial_samples(trial_measures(results.episodes), "assisted", "unassisted")
-    return Outcome(findings, results, {name: s.mean(axis=0) for name, s in samples.items()})
+    comparisons = compare(printed_numbers("cliff-walking"), findings.summary, findings.regrets)
+    return Outcome(
+        findings, comparisons, results, {name: s.mean(axis=0) for name, s in samples.items()}
+    )
 
 
 def regret_of_points(means: dict[str, np.ndarray], axis: int) -> float:
@@ -106,7 +112,7 @@ def regret_of_points(means: dict[str, np.ndarray], axis: int) -> float:
 
     Args:
         means: assisted and unassisted mean by condition.
-        axis: 0 where performance is matched and learning compared, 1 the reverse.
+        axis: 0 if performance is matched and learning compared, 1 the reverse.
 
     Returns:
         The share of the baseline's regret that the method avoids.
@@ -121,9 +127,9 @@ def regret_of_points(means: dict[str, np.ndarray], axis: int) -> float:
 
 
 def printed_points() -> dict[str, np.ndarray]:
-    """Assisted and unassisted mean by condition, as printed; NaN where the paper is silent."""
+    """Assisted and unassisted mean by condition, as printed; NaN if the paper prints none."""
     means: dict[str, np.ndarray] = {}
-    for row in published_numbers("cliff-walking")["number"]:
+    for row in printed_numbers("cliff-walking")["number"]:
         point = means.setdefault(row["condition"], np.full(2, np.nan))
         point[("assisted", "unassisted").index(row["measure"])] = row["value"]
     return means
@@ -145,15 +151,15 @@ class Change(NamedTuple):
 
     Attributes:
         what: in words.
-        none: without help.
+        none: without assistance.
         thresholding: with Local Q-Thresholding, alpha = 0.0195.
         bumpers: with Stochastic Q Bumpers, alpha = 0.7.
     """
 
     what: str
-    none: tuple[Estimate, Estimate]
-    thresholding: tuple[Estimate, Estimate]
-    bumpers: tuple[Estimate, Estimate]
+    none: tuple[IntervalEstimate, IntervalEstimate]
+    thresholding: tuple[IntervalEstimate, IntervalEstimate]
+    bumpers: tuple[IntervalEstimate, IntervalEstimate]
 
 
 def changes() -> Iterator[Change]:
@@ -177,7 +183,9 @@ def changes() -> Iterator[Change]:
         )
 
 
-def returns(learner: QLearner, name: str, **options: Any) -> tuple[Estimate, Estimate]:
+def returns(
+    learner: QLearner, name: str, **options: Any
+) -> tuple[IntervalEstimate, IntervalEstimate]:
     """Assisted and unassisted return of 100 learners of Cliff Walking with an assistant."""
     outcomes = simulate(cliff_walking(), make_assistant(name, **options), learner=learner).outcomes
     return (
@@ -193,8 +201,8 @@ def tradeoff_figure(summary: pl.DataFrame) -> Figure:
         for axes in (left, right):
             for part in summary.partition_by("assistant", maintain_order=True):
                 _draw_means(axes, part)
-        left.set(xlim=(-390, -310), xticks=[-350], ylabel="mean return without the assistant")
-        right.set(xlim=(42, 91), xlabel="mean return with the assistant")
+        left.set(xlim=(-390, -310), xticks=[-350], ylabel="mean unassisted return")
+        right.set(xlim=(42, 91), xlabel="mean assisted return")
         right.spines["left"].set_visible(False)
         right.tick_params(axis="y", length=0)
         left.set_yscale("symlog", linthresh=100)
@@ -219,21 +227,21 @@ def tradeoff_figure(summary: pl.DataFrame) -> Figure:
 
 
 def profiles_figure(summaries: dict[str, pl.DataFrame]) -> Figure:
-    """Assistants that override, a panel a profile, with the paper's points."""
+    """Assistants that override, a panel per profile, with the paper's points."""
     with figure(9.4, 4.4) as drawing:
         panels = drawing.subplots(1, len(summaries), sharex=True, sharey=True)
         for axes, (profile, summary) in zip(panels, summaries.items(), strict=True):
-            helping = summary.filter(pl.col("overrides_mean") > 0, pl.col("alpha").is_not_null())
-            for part in helping.partition_by("assistant", maintain_order=True):
+            overriding = summary.filter(pl.col("overrides_mean") > 0, pl.col("alpha").is_not_null())
+            for part in overriding.partition_by("assistant", maintain_order=True):
                 _draw_means(axes, part)
             for name, point in printed_points().items():
                 axes.plot(
                     *point, "*", markersize=15, fillstyle="none", markeredgewidth=1.6,
                     color=looks(NAMES)[assistant_of(name)].colour,
                 )  # fmt: skip
-            axes.set(title=f"profile {profile}", xlabel="mean return with the assistant")
+            axes.set(title=f"profile {profile}", xlabel="mean assisted return")
         panels[0].plot([], [], "*", ms=12, mfc="none", color="#555555", label="in the paper")
-        panels[0].set_ylabel("mean return without it")
+        panels[0].set_ylabel("mean unassisted return")
         panels[0].legend(loc="lower left")
     return drawing
 
@@ -248,7 +256,7 @@ def _draw_means(axes: Axes, part: pl.DataFrame) -> None:
 
 
 def label(row: Comparison) -> str:
-    """A printed number in words, with what kind of number it is where that is doubtful."""
+    """A printed number in words, with what kind of number it is if that is doubtful."""
     if row.note:
         return f"{row.what}, {row.note.replace(':', ';').partition(';')[0]}"
     condition, _, measure = row.what.rpartition(", ")

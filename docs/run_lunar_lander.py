@@ -12,8 +12,8 @@ from pathlib import Path
 import tomli_w
 
 from qbumpers import make_task
-from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experts.choosing import best, judge
+from qbumpers.reproduction.experiments import profiles, reproduction
 from qbumpers.values import NetworkValues, load_values
 
 TASK = "lunar-lander"
@@ -59,7 +59,7 @@ def second_best(expert: Path) -> NetworkValues:
 def run_smaller(
     folder: Path, name: str, profile: str = "figures", values: str | None = None
 ) -> None:
-    """Four conditions of a few people in a profile, or with other values."""
+    """Four conditions of a few learners in a profile, or with other values."""
     design = reproduction(TASK, profile, trials=TRIALS, values=values)
     settings = design.model_dump(mode="json", exclude_none=True)
     settings["name"] = f"{TASK}-{name}"
@@ -79,7 +79,7 @@ def qbumpers(*arguments: str | Path) -> None:
 
 
 def python(*arguments: str | Path) -> None:
-    """Run Python; stop where it fails."""
+    """Run Python; stop if it fails."""
     ended = subprocess.run([sys.executable, *map(str, arguments)])
     if ended.returncode:
         sys.exit(ended.returncode)

@@ -8,7 +8,7 @@ import jinja2
 import numpy as np
 
 from qbumpers.analysis.figures.style import readable
-from qbumpers.analysis.statistics import Estimate
+from qbumpers.analysis.statistics import IntervalEstimate
 
 DOCS = Path(__file__).parent
 PLUS_MINUS = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
@@ -40,7 +40,7 @@ def per_cent(value: float) -> str:
     return number(100 * value, 0) + "%" if np.isfinite(value) else "–"
 
 
-def estimate(value: Estimate, digits: int = 1) -> str:
+def estimate(value: IntervalEstimate, digits: int = 1) -> str:
     """A mean with half the width of its 95% interval."""
     if not np.isfinite(value.mean):
         return number(None)
@@ -55,12 +55,12 @@ def with_error(value: Any, digits: int = 1) -> str:
     return f"{number(value.mean, digits)}{PLUS_MINUS}{number(1.96 * value.error, digits)}"
 
 
-def rate(value: Estimate) -> str:
+def rate(value: IntervalEstimate) -> str:
     """A share in per cent, with half the width of its 95% interval."""
-    return estimate(Estimate(*(100 * part for part in value)), 0)
+    return estimate(IntervalEstimate(*(100 * part for part in value)), 0)
 
 
-def measure(row: dict[str, Any], name: str) -> Estimate:
+def measure(row: dict[str, Any], name: str) -> IntervalEstimate:
     """A measure of a row of `summary.csv`."""
-    parts = (row[f"{name}_{part}"] for part in Estimate._fields)
-    return Estimate(*(float("nan") if part is None else part for part in parts))
+    parts = (row[f"{name}_{part}"] for part in IntervalEstimate._fields)
+    return IntervalEstimate(*(float("nan") if part is None else part for part in parts))

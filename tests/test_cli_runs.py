@@ -78,8 +78,8 @@ def test_tuning_prints_its_choice_and_what_it_saved(call, tmp_path):
     assert re.search(r"^none \d+ .* below the floor$", output, re.MULTILINE)
     assert re.search(r"^\d+ trials, \d+% of the full grid's 60\.$", output, re.MULTILINE)
     assert re.search(
-        r"Choice: stochastic-q-bumpers/alpha=0\.[37] returns .* with help, above 40 with 95% "
-        r"confidence, and .* alone\.",
+        r"Choice: stochastic-q-bumpers/alpha=0\.[37] returns .* assisted, above 40 with 95% "
+        r"confidence, and .* unassisted\.",
         words(output),
     )
 
@@ -88,4 +88,6 @@ def test_tuning_without_a_choice_names_the_nearest_and_fails(call, tmp_path):
     path = write_toml(tmp_path / "plain.toml", trials=20, episodes=20)
     status, output, _ = call("tune", path, "--floor", 1000, "--out", tmp_path / "out")
     assert status == 1
-    assert "No choice: no condition is surely above 1000. The nearest is stochastic-q" in output
+    assert (
+        "No choice: no condition is significantly above 1000. The nearest is stochastic-q" in output
+    )

@@ -26,11 +26,11 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
     """Write a file so that it appears whole or not at all.
 
     Args:
-        path: of the file; its folder is made where it is missing.
+        path: of the file; its folder is made if it is missing.
         write: writes it at the path that it is given.
 
     Raises:
-        StoreError: where it cannot be written, for instance on a full disk.
+        StoreError: if it cannot be written, for example on a full disk.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -47,18 +47,18 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
 
 
 class Folder(Protocol):
-    """A folder of files by name, for instance "cells/1749e96024414f24/000000-100.parquet"."""
+    """A folder of files by name, for example "cells/1749e96024414f24/000000-100.parquet"."""
 
     def names(self, under: str) -> list[str]:
-        """Names of the files in a folder below, sorted; none where there is no such folder."""
+        """Names of the files in a folder below, sorted; none if there is no such folder."""
         ...
 
     def read(self, name: str) -> bytes | None:
-        """What a file holds; None where there is none."""
+        """What a file holds; None if there is none."""
         ...
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a file so that it appears whole or not at all; StoreError where it cannot be."""
+        """Write a file so that it appears whole or not at all; StoreError if it cannot be."""
         ...
 
     def remove(self, name: str) -> None:
@@ -68,7 +68,7 @@ class Folder(Protocol):
     def locked(self) -> contextlib.AbstractContextManager[None]:
         """Keep other writers out, and clear away what a killed one left half-written.
 
-        RequestError where the folder is a file or another run is writing to it; StoreError where
+        RequestError if the folder is a file or another run is writing to it; StoreError if
         it cannot be written.
         """
         ...
@@ -84,7 +84,7 @@ def open_folder(location: str | Path) -> Folder:
         The folder; nothing is made or looked at yet.
 
     Raises:
-        RequestError: where the URL is of no known kind, or what it needs is not installed.
+        RequestError: if the URL is of no known kind, or what it needs is not installed.
     """
     if "://" not in str(location):
         return LocalFolder(Path(location))
@@ -154,13 +154,13 @@ class LocalFolder:
 
 
 class RemoteFolder:
-    """A folder that fsspec reaches, for instance in an object store.
+    """A folder that fsspec reaches, for example in an object store.
 
     Args:
         url: of the folder.
 
     Raises:
-        RequestError: where the URL is of no known kind, or what it needs is not installed.
+        RequestError: if the URL is of no known kind, or what it needs is not installed.
     """
 
     def __init__(self, url: str) -> None:
@@ -207,7 +207,7 @@ class RemoteFolder:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """See `Folder`; an object store cannot tell that a run was killed, so people must."""
+        """See `Folder`; an object store cannot tell that a run was killed: a user must."""
         with self._failing(_LOCK):
             try:
                 self._put(_LOCK, platform.node().encode(), "create")
@@ -215,7 +215,7 @@ class RemoteFolder:
                 owner = (self.read(_LOCK) or b"").decode(errors="replace")
                 raise RequestError(
                     f"output folder {self}: a run on {owner or 'another machine'} is writing to "
-                    f"it; where that was killed, delete {self}/{_LOCK}"
+                    f"it; if that was killed, delete {self}/{_LOCK}"
                 ) from error
         try:
             yield
@@ -253,7 +253,7 @@ def local_copy(location: str | Path, names: Iterable[str]) -> Iterator[Path]:
 
     Raises:
         RequestError: as `open_folder`.
-        StoreError: where a file cannot be read or written.
+        StoreError: if a file cannot be read or written.
     """
     if "://" not in str(location):
         yield Path(location)

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 import scipy.stats
 
-from qbumpers.analysis.comparisons import advantages, against, methods, optimal, pooled
+from qbumpers.analysis.comparisons import against, compare_methods, optimal, pooled
 from qbumpers.analysis.measures import MEASURES
 from qbumpers.errors import RequestError
 
@@ -150,7 +150,8 @@ def test_pairs_are_pooled_together():
 
 def test_methods_are_measured_by_what_they_cover():
     trials = measured(trials=400)
-    found = methods(trials, generator(), reference=np.array([-400.0, -600.0]))
+    reference = np.array([-400.0, -600.0])
+    found = compare_methods(trials, generator(), reference=reference).methods
     assert found["assistant"].to_list() == ["none", "local-q-thresholding", "stochastic-q-bumpers"]
     assert found["conditions"].to_list() == [1, 2, 2]
     truth = [100 * 560, 450 * 100 + 1 * 80, 454 * 380 + 12 * 140]
@@ -164,10 +165,10 @@ def test_methods_are_measured_by_what_they_cover():
     assert found["reference_unassisted"].to_list() == [-600] * 3
 
 
-def test_the_reference_is_the_worst_of_all_conditions_unless_told():
+def test_the_reference_is_the_worst_of_all_conditions_by_default():
     trials = measured()
     means = [[sample(trials, name, m).mean() for m in ("assisted", "unassisted")] for name in MEANS]
-    found = methods(trials, generator()).row(0, named=True)
+    found = compare_methods(trials, generator()).methods.row(0, named=True)
     reference = (found["reference_assisted"], found["reference_unassisted"])
     assert reference == pytest.approx(tuple(np.min(means, axis=0)))
 
@@ -175,12 +176,8 @@ def test_the_reference_is_the_worst_of_all_conditions_unless_told():
 def test_advantages_are_differences_of_what_methods_cover():
     trials = measured(trials=400)
     reference = np.array([-400.0, -600.0])
-    covered = dict(
-        methods(trials, generator(), False, reference)
-        .select("assistant", "hypervolume_mean")
-        .iter_rows()
-    )
-    found = advantages(trials, generator(), reference=reference)
+    methods, found = compare_methods(trials, generator(), reference=reference)
+    covered = dict(methods.select("assistant", "hypervolume_mean").iter_rows())
     assert found.height == 3
     for row in found.iter_rows(named=True):
         expected = covered[row["assistant"]] - covered[row["other"]]
@@ -191,7 +188,7 @@ def test_advantages_are_differences_of_what_methods_cover():
 
 def test_a_single_method_has_no_advantages():
     trials = measured().filter(assistant="stochastic-q-bumpers")
-    found = advantages(trials, generator())
+    found = compare_methods(trials, generator()).advantages
     assert found.height == 0
     assert found.columns == [
         "assistant", "other", "advantage_mean", "advantage_low", "advantage_high", "probability",
@@ -204,8 +201,7 @@ def test_trials_of_several_learners_are_refused():
         lambda: against(trials, NONE, "assisted"),
         lambda: optimal(trials, generator()),
         lambda: pooled(trials, "assisted", generator()),
-        lambda: methods(trials, generator()),
-        lambda: advantages(trials, generator()),
+        lambda: compare_methods(trials, generator()),
     ):
         with pytest.raises(RequestError, match=r"trials of 2 learners .*filter"):
             compare()
@@ -232,7 +228,8 @@ def test_pairs_need_the_same_trials_in_every_condition():
 
 def test_equal_generators_give_equal_tables():
     trials = measured()
-    for compare in (optimal, methods, advantages):
-        assert compare(trials, generator()).equals(compare(trials, generator()))
-    first, other = (methods(trials, np.random.default_rng(seed)) for seed in (1, 2))
+    assert optimal(trials, generator()).equals(optimal(trials, generator()))
+    both = zip(*(compare_methods(trials, generator()) for _ in range(2)), strict=True)
+    assert all(table.equals(again) for table, again in both)
+    first, other = (compare_methods(trials, np.random.default_rng(s)).methods for s in (1, 2))
     assert first["hypervolume_high"].to_list() != other["hypervolume_high"].to_list()

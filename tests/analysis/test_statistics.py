@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from qbumpers.analysis.statistics import (
     Difference,
-    Estimate,
+    IntervalEstimate,
     bonferroni,
     bootstrap_interval,
     difference,
@@ -61,7 +61,7 @@ def test_an_interval_is_for_95_per_cent_unless_told_otherwise():
 
 
 def test_equal_samples_have_an_interval_without_width():
-    assert mean_interval(np.full(7, 87.0)) == Estimate(87.0, 87.0, 87.0)
+    assert mean_interval(np.full(7, 87.0)) == IntervalEstimate(87.0, 87.0, 87.0)
 
 
 def test_a_single_sample_has_a_mean_and_no_interval():
@@ -138,9 +138,9 @@ def test_a_condition_that_never_varies_is_compared_by_the_spread_of_the_other():
 
 def test_conditions_that_never_vary_differ_surely_or_not_at_all():
     same, other = np.full(3, 87.0), np.full(5, 85.0)
-    assert difference(same, other) == Difference(Estimate(2.0, 2.0, 2.0), 0.0)
+    assert difference(same, other) == Difference(IntervalEstimate(2.0, 2.0, 2.0), 0.0)
     assert difference(same, np.full(3, 85.0), paired=True).p_value == 0
-    assert difference(same, same) == Difference(Estimate(0.0, 0.0, 0.0), 1.0)
+    assert difference(same, same) == Difference(IntervalEstimate(0.0, 0.0, 0.0), 1.0)
 
 
 @pytest.mark.parametrize("paired", [False, True])
@@ -345,7 +345,9 @@ def test_a_bootstrap_has_no_interval_of_one_trial_and_no_width_without_spread():
     single = bootstrap_interval([np.ones(1)], np.mean, generator)
     assert single.mean == 1
     assert math.isnan(single.low)
-    assert bootstrap_interval([np.full(9, 87.0)], np.mean, generator) == Estimate(87, 87, 87)
+    assert bootstrap_interval([np.full(9, 87.0)], np.mean, generator) == IntervalEstimate(
+        87, 87, 87
+    )
 
 
 @pytest.mark.parametrize("method", ["percentile", "BCa"])

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.experiments.sources import profiles
+from qbumpers.reproduction.experiments import profiles
 from tests.experiments.examples import cart, write_toml
 from tests.processes import ENVIRONMENT
 from tests.texts import words

@@ -36,7 +36,7 @@ def test_a_race_tells_the_time_from_its_first_trials_on():
 
 @pytest.mark.parametrize(
     ("steps", "text"),
-    [(0, ""), (30_000, "3,000 steps a second"), (41_000_000, "4.1 million steps a second")],
+    [(0, ""), (30_000, "3,000 steps per second"), (41_000_000, "4.1 million steps per second")],
 )
 def test_a_rate_is_told_in_the_unit_that_suits_it(steps, text):
     assert rate(steps, 10.0) == text

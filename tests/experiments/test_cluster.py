@@ -30,6 +30,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::FutureWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+    pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning"),  # a random network
 ]
 
 # Loopback only, and nothing written to the home folder. A cluster that is not started by RayCluster
@@ -272,7 +273,7 @@ import sys
 from qbumpers.experiments.cluster import RayCluster
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 
 def report(progress):
     if progress.trials > 0 and trials > 1000:

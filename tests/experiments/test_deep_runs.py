@@ -24,6 +24,9 @@ from qbumpers.simulation import run
 from tests.experiments.examples import cart, cells_of, contents_of, write_toml
 from tests.processes import ENVIRONMENT, PROGRAM, finish
 
+# The experts of these experiments are random networks.
+pytestmark = pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning")
+
 STOPPED = "stopped: what is finished is kept; the same command goes on from there\n"
 
 

@@ -4,7 +4,8 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.sources import load_experiment, make_experiment, reproduction
+from qbumpers.experiments.sources import load_experiment, make_experiment
+from qbumpers.reproduction.experiments import reproduction
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import solve
 from tests.experiments.examples import settings, write_toml

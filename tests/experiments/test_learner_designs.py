@@ -11,6 +11,9 @@ from qbumpers.learners import DoubleDQN, QLearner
 from tests.experiments.examples import cart, settings, write_toml
 from tests.values.networks import network_of
 
+# The experts of these experiments are random networks.
+pytestmark = pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning")
+
 EVERYTHING = {
     "name": "double-dqn",
     "perception": "observant",

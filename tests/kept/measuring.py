@@ -20,8 +20,9 @@ from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
-from qbumpers.experiments.sources import make_experiment, reproduction
+from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.store import load
+from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import record
 from qbumpers.tuning import tune
 

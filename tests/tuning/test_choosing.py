@@ -66,7 +66,7 @@ def test_a_winner_that_fresh_trials_do_not_confirm_leaves_the_race_to_the_others
 
 def test_a_condition_that_the_race_cannot_tell_from_the_floor_is_not_chosen(tmp_path):
     found, _ = tuned(tmp_path, [(0.0, 9), (3, 1)], trials=30)
-    assert verdicts(found) == ["not surely above the floor", "chosen"]
+    assert verdicts(found) == ["not significantly above the floor", "chosen"]
 
 
 def test_a_floor_out_of_reach_leaves_no_choice_and_names_the_nearest(tmp_path):

@@ -8,7 +8,7 @@ import scipy.stats
 
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.sources import reproduction
+from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import run
 from qbumpers.tuning import tune
 from tests.tuning.made_up import tuned

@@ -5,17 +5,17 @@ method is an assistant with all its settings.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
 
 from qbumpers.analysis.frontier import is_optimal, optimal_probability
-from qbumpers.analysis.hypervolume import compare_hypervolumes, hypervolume
+from qbumpers.analysis.hypervolume import Hypervolumes, compare_hypervolumes, hypervolume
 from qbumpers.analysis.measures import MEASURES, trial_samples
 from qbumpers.analysis.resampling import resampled_means, stratified_interval
 from qbumpers.analysis.statistics import (
-    Estimate,
+    IntervalEstimate,
     bonferroni,
     difference,
     holm,
@@ -39,14 +39,14 @@ def against(trials: pl.DataFrame, control: str, measure: str, paired: bool = Fal
         paired: whether trials of equal number belong together (common random numbers).
 
     Returns:
-        A row a condition but the control: condition, assistant, alpha; `difference_mean`, `_low`,
+        A row per condition but the control: condition, assistant, alpha; `difference_mean`, `_low`,
         `_high` (condition minus control) and `simultaneous_low`, `_high`, which hold for all rows
         at once (Bonferroni); `p_value` of the t test and `p_adjusted` (Holm); and
         `improvement_mean`, `_low`, `_high`, the probability that a trial exceeds one of the control
-        (its own partner, where paired). Null where unknown.
+        (its own partner, if paired). Null if unknown.
 
     Raises:
-        RequestError: where control, measure or pairs cannot be had from these trials.
+        RequestError: if control, measure or pairs cannot be had from these trials.
     """
     samples = _samples(trials, (measure,), paired)
     if control not in samples:
@@ -76,7 +76,7 @@ def against(trials: pl.DataFrame, control: str, measure: str, paired: bool = Fal
 def optimal(
     trials: pl.DataFrame, generator: np.random.Generator, paired: bool = False
 ) -> pl.DataFrame:
-    """Which conditions are Pareto-optimal in assisted and unassisted return, and how surely.
+    """Which conditions are Pareto-optimal in both returns, and how certain that is.
 
     Args:
         trials: of one learner, from `trial_measures`.
@@ -84,11 +84,11 @@ def optimal(
         paired: whether trials of equal number belong together (common random numbers).
 
     Returns:
-        A row a condition: condition, assistant, alpha, assisted, unassisted (means), `pareto`, and
-        `probability`, the share of the resamples in which it is Pareto-optimal.
+        A row per condition: condition, assistant, alpha, assisted, unassisted (means), `pareto`,
+        and `probability`, the share of the resamples in which it is Pareto-optimal.
 
     Raises:
-        RequestError: where the trials are not of one learner, or pairs are incomplete.
+        RequestError: if the trials are not of one learner, or pairs are incomplete.
     """
     samples = _samples(trials, RETURNS, paired)
     means = np.array([values.mean(axis=0) for values in samples.values()])
@@ -112,12 +112,12 @@ def pooled(
         paired: whether trials of equal number belong together (common random numbers).
 
     Returns:
-        A row a method: assistant, conditions, trials (of all of them); `macro_mean`, `_low`,
+        A row per method: assistant, conditions, trials (of all of them); `macro_mean`, `_low`,
         `_high`, the mean of the conditions' means; `interquartile_mean`, `_low`, `_high`, the mean
         of the middle half of all trials. Percentile intervals of the stratified bootstrap.
 
     Raises:
-        RequestError: where measure or pairs cannot be had from these trials.
+        RequestError: if measure or pairs cannot be had from these trials.
     """
     samples = _samples(trials, (measure,), paired)
     strata = {m: [samples[n][:, 0] for n in names] for m, names in _methods(trials).items()}
@@ -136,34 +136,52 @@ def pooled(
     return _with_numbers(pl.DataFrame({"assistant": list(strata)}), columns)
 
 
-def methods(
+class MethodTables(NamedTuple):
+    """Whole methods compared by what their settings cover.
+
+    Attributes:
+        methods: a row per method: assistant, conditions; `hypervolume_mean`, `_low`, `_high`, in
+            squared reward units; `share` of what all conditions cover together; `largest`, the
+            share of the resamples in which it covers most; `reference_assisted`,
+            `reference_unassisted`.
+        advantages: a row per pair: assistant, other; `advantage_mean`, `_low`, `_high`, by how much
+            the first one's hypervolume is larger, in squared reward units; `probability`, the share
+            of the resamples in which it is.
+    """
+
+    methods: pl.DataFrame
+    advantages: pl.DataFrame
+
+
+def compare_methods(
     trials: pl.DataFrame,
     generator: np.random.Generator,
     paired: bool = False,
     reference: np.ndarray | None = None,
-) -> pl.DataFrame:
-    """Every method by what its settings cover of performance and learning.
+) -> MethodTables:
+    """Every method, and every two methods, by what their settings cover.
 
     Args:
         trials: of one learner, from `trial_measures`.
-        generator: draws resamples of the trials.
+        generator: draws resamples of the trials, the same for both tables.
         paired: whether trials of equal number belong together (common random numbers).
         reference: float64 [2], assisted and unassisted return above which hypervolumes are
-            measured; the worst of each over all conditions where None.
-
-    Returns:
-        A row a method: assistant, conditions; `hypervolume_mean`, `_low`, `_high`, in squared
-        reward units; `share` of what all conditions cover together; `largest`, the share of the
-        resamples in which it covers most; `reference_assisted`, `reference_unassisted`.
+            measured; the worst of each over all conditions if None.
 
     Raises:
-        RequestError: where the trials are not of one learner, or pairs are incomplete.
+        RequestError: if the trials are not of one learner, or pairs are incomplete.
     """
     samples = _samples(trials, RETURNS, paired)
     settings = _methods(trials)
     found = compare_hypervolumes(samples, settings, generator, reference, paired)
     means = np.array([values.mean(axis=0) for values in samples.values()])
     whole = float(hypervolume(means, found.reference))
+    return MethodTables(_methods_table(found, settings, whole), _advantages_table(found))
+
+
+def _methods_table(
+    found: Hypervolumes, settings: Mapping[str, Sequence[str]], whole: float
+) -> pl.DataFrame:
     columns = {
         "conditions": [len(names) for names in settings.values()],
         **_columns("hypervolume", found.methods.values()),
@@ -175,30 +193,7 @@ def methods(
     return _with_numbers(pl.DataFrame({"assistant": list(settings)}), columns)
 
 
-def advantages(
-    trials: pl.DataFrame,
-    generator: np.random.Generator,
-    paired: bool = False,
-    reference: np.ndarray | None = None,
-) -> pl.DataFrame:
-    """Every two methods compared by what their settings cover.
-
-    Args:
-        trials: of one learner, from `trial_measures`.
-        generator: draws resamples of the trials.
-        paired: whether trials of equal number belong together (common random numbers).
-        reference: float64 [2], as for `methods`.
-
-    Returns:
-        A row a pair: assistant, other; `advantage_mean`, `_low`, `_high`, by how much the first
-        one's hypervolume is larger, in squared reward units; `probability`, the share of the
-        resamples in which it is.
-
-    Raises:
-        RequestError: where the trials are not of one learner, or pairs are incomplete.
-    """
-    samples = _samples(trials, RETURNS, paired)
-    found = compare_hypervolumes(samples, _methods(trials), generator, reference, paired)
+def _advantages_table(found: Hypervolumes) -> pl.DataFrame:
     pairs = list(found.advantages)
     names = {"assistant": [first for first, _ in pairs], "other": [second for _, second in pairs]}
     columns = {
@@ -255,19 +250,23 @@ def _methods(trials: pl.DataFrame) -> dict[str, list[str]]:
     return settings
 
 
-def _macro(strata: Sequence[np.ndarray], generator: np.random.Generator, paired: bool) -> Estimate:
+def _macro(
+    strata: Sequence[np.ndarray], generator: np.random.Generator, paired: bool
+) -> IntervalEstimate:
     """Mean of the conditions' means; no interval for a single trial."""
     mean = float(np.mean([values.mean() for values in strata]))
     if min(map(len, strata)) < 2:
-        return Estimate(mean, float("nan"), float("nan"))
+        return IntervalEstimate(mean, float("nan"), float("nan"))
     samples = [values[:, np.newaxis] for values in strata]
     replicates = resampled_means(samples, generator, paired).mean(axis=(1, 2))
     return percentile_interval(mean, replicates)
 
 
-def _columns(name: str, estimates: Iterable[Estimate]) -> dict[str, list[float]]:
+def _columns(name: str, estimates: Iterable[IntervalEstimate]) -> dict[str, list[float]]:
     found = list(estimates)
-    return {f"{name}_{part}": [getattr(e, part) for e in found] for part in Estimate._fields}
+    return {
+        f"{name}_{part}": [getattr(e, part) for e in found] for part in IntervalEstimate._fields
+    }
 
 
 def _with_numbers(table: pl.DataFrame, columns: Mapping[str, Any]) -> pl.DataFrame:

@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from qbumpers.analysis.claims import Claim, judged
-from qbumpers.analysis.comparisons import RETURNS, advantages, against, methods, optimal, pooled
+from qbumpers.analysis.additions import Additions
+from qbumpers.analysis.comparisons import RETURNS, against, compare_methods, optimal, pooled
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import summary, trial_samples
-from qbumpers.analysis.published import Comparison, compare, published_numbers
 from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.learner_designs import written
@@ -20,16 +19,16 @@ class LearnerFindings(NamedTuple):
     """What the tables say about one kind of learner; different learners are never mixed.
 
     Attributes:
-        learner: its id, for instance "q-learning/perception=observant".
+        learner: its id, for example "q-learning/perception=observant".
         summary: its rows of `summary.csv`.
         trials: its rows of `trials.parquet`.
-        frontier: a row a condition: its mean returns with intervals, whether it is Pareto-optimal
+        frontier: a row per condition: its mean returns with intervals, whether it is Pareto-optimal
             (`pareto`) and the probability of it.
-        methods: a row a method: `methods.csv`.
-        advantages: a row a pair of methods: `advantages.csv`.
-        control: the condition without assistance; None where there is none to compare with.
-        differences: a row a measure and condition, against the control: `differences.csv`; no rows
-            without a control.
+        methods: a row per method: `methods.csv`.
+        advantages: a row per pair of methods: `advantages.csv`.
+        control: the condition without assistance; None if there is none to compare with.
+        differences: a row per measure and condition, against the control: `differences.csv`; no
+            rows without a control.
         compared: the method and the baseline of the regrets; None without two swept ones.
         regrets: by what is matched, "performance" and "learning".
     """
@@ -47,7 +46,7 @@ class LearnerFindings(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What tells the learner from others, for instance "perception=observant"."""
+        """What distinguishes the learner from others, for example "perception=observant"."""
         return self.learner.partition("/")[2]
 
 
@@ -55,11 +54,10 @@ class Findings(NamedTuple):
     """What the tables of a report say.
 
     Attributes:
-        summary: a row a condition.
-        trials: a row a trial.
+        summary: a row per condition.
+        trials: a row per trial.
         learners: what compares conditions, one for each kind of learner.
-        comparisons: with printed numbers, empty where the experiment reproduces none.
-        claims: that the paper makes in words, judged; empty where the experiment reproduces none.
+        additions: what is added to the report of this experiment.
         headlines: what came out, in plain sentences; empty until `find` of a report adds them.
         cautions: what to keep in mind, in plain sentences; the same.
     """
@@ -67,14 +65,13 @@ class Findings(NamedTuple):
     summary: pl.DataFrame
     trials: pl.DataFrame
     learners: list[LearnerFindings]
-    comparisons: list[Comparison]
-    claims: Sequence[Claim] = ()
+    additions: Additions = Additions()
     headlines: Sequence[str] = ()
     cautions: Sequence[str] = ()
 
     @property
     def regrets(self) -> dict[str, Regret]:
-        """Regrets by what is matched; none where there are several learners, each with its own."""
+        """Regrets by what is matched; none if there are several learners, each with its own."""
         return self.learners[0].regrets if len(self.learners) == 1 else {}
 
     @property
@@ -91,7 +88,7 @@ def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
         experiment: as run.
 
     Returns:
-        The tables, without sentences.
+        The tables, without additions and sentences.
     """
     options = {n.condition: _as_cells(n.assistant) for n in experiment.conditions()}
     table = summary(trials, options, experiment.episodes, experiment.retention)
@@ -99,16 +96,7 @@ def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
         _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
         for index, part in enumerate(table.partition_by("learner", maintain_order=True))
     ]
-    found = Findings(table, trials, learners, [])
-    if not experiment.reproduces:
-        return found
-    printed = published_numbers(experiment.reproduces)
-    generator = np.random.default_rng([experiment.seed, len(learners), 7])
-    paired = experiment.common_random_numbers
-    return found._replace(
-        comparisons=compare(printed, table, found.regrets),
-        claims=judged(experiment.reproduces, trials, generator, paired),
-    )
+    return Findings(table, trials, learners)
 
 
 def _as_cells(assistant: Assistant) -> dict[str, Any]:
@@ -129,7 +117,7 @@ def _about(
     best = optimal(trials, generator(0), paired)
     returns = [f"{measure}_{part}" for measure in RETURNS for part in ("mean", "low", "high")]
     points = table.select("condition", "assistant", *returns, "overrides_mean")
-    areas = methods(trials, generator(1), paired)
+    areas, advantages = compare_methods(trials, generator(1), paired)
     for use, measure in enumerate(RETURNS, start=2):
         means = pooled(trials, measure, generator(use), paired).select(
             "assistant",
@@ -146,7 +134,7 @@ def _about(
             best.select("condition", "pareto", "probability"), on="condition", maintain_order="left"
         ),
         methods=areas,
-        advantages=advantages(trials, generator(6), paired),
+        advantages=advantages,
         control=control,
         differences=_differences(trials, control, paired),
         compared=compared,
@@ -155,7 +143,7 @@ def _about(
 
 
 def _control(table: pl.DataFrame) -> str | None:
-    """The condition without assistance, where there are others."""
+    """The condition without assistance, if there are others."""
     controls = table.filter(assistant="none")["condition"]
     return str(controls[0]) if len(controls) and table.height > 1 else None
 

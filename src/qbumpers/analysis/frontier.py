@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.analysis.resampling import function_interval, resampled_means
-from qbumpers.analysis.statistics import RESAMPLES, Estimate
+from qbumpers.analysis.statistics import RESAMPLES, IntervalEstimate
 
 
 def pareto(points: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def at_matched(points: np.ndarray, level: np.ndarray | float, axis: int) -> np.n
         axis: 0 matches assisted performance, 1 matches unassisted learning.
 
     Returns:
-        float64 [...], the other measure; NaN where the level is out of reach.
+        float64 [...], the other measure; NaN if the level is out of reach.
     """
     matched, asked = points[..., axis], points[..., 1 - axis]
     levels = np.asarray(level, np.float64)[..., np.newaxis]
@@ -117,7 +117,7 @@ def beaten_share(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
 
 
 def lead(ours: np.ndarray, theirs: np.ndarray, axis: int) -> np.ndarray:
-    """How far one method leads in one measure, where both are equal in the other.
+    """How far one method leads in one measure, if both are equal in the other.
 
     Args:
         ours: float64 [..., N, 2], assisted and unassisted; larger is better.
@@ -126,7 +126,7 @@ def lead(ours: np.ndarray, theirs: np.ndarray, axis: int) -> np.ndarray:
 
     Returns:
         float64 [...], what ours reach at the level of each of theirs, minus what that one has, on
-        average over those whose level ours reach; NaN where that is none.
+        average over those whose level ours reach; NaN if that is none.
     """
     leads = np.stack(
         [
@@ -142,10 +142,10 @@ def lead(ours: np.ndarray, theirs: np.ndarray, axis: int) -> np.ndarray:
 
 
 class Regret(NamedTuple):
-    """How much less a method loses than a baseline, where both are equally good otherwise.
+    """How much less a method loses than a baseline, if both are equally good otherwise.
 
     Attributes:
-        axis: 0 where assisted performance is matched and learning compared, 1 the reverse.
+        axis: 0 if assisted performance is matched and learning compared, 1 the reverse.
         baseline_condition: the baseline's setting that is matched.
         best_condition: the condition that is best in the compared measure.
         level: the matched measure, at the baseline's setting.
@@ -160,9 +160,9 @@ class Regret(NamedTuple):
     best_condition: str
     level: float
     baseline: float
-    method: Estimate
+    method: IntervalEstimate
     best: float
-    reduction: Estimate
+    reduction: IntervalEstimate
 
 
 def matched_regret(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.analysis.resampling import function_interval, resampled_means
-from qbumpers.analysis.statistics import RESAMPLES, Estimate
+from qbumpers.analysis.statistics import RESAMPLES, IntervalEstimate
 
 
 def hypervolume(points: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -28,7 +28,7 @@ def hypervolume(points: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def worst(samples: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The worst mean of each measure over all conditions: the reference point unless told.
+    """The worst mean of each measure over all conditions: the reference point by default.
 
     Args:
         samples: float64 [T, 2], assisted and unassisted by trial, of each condition.
@@ -47,7 +47,7 @@ class Advantage(NamedTuple):
         probability: share of the resamples in which it is larger; ties count half.
     """
 
-    estimate: Estimate
+    estimate: IntervalEstimate
     probability: float
 
 
@@ -62,7 +62,7 @@ class Hypervolumes(NamedTuple):
     """
 
     reference: np.ndarray
-    methods: dict[str, Estimate]
+    methods: dict[str, IntervalEstimate]
     largest: dict[str, float]
     advantages: dict[tuple[str, str], Advantage]
 
@@ -83,7 +83,7 @@ def compare_hypervolumes(
         samples: float64 [T, 2], assisted and unassisted by trial, of all conditions.
         methods: ids of the settings of each method.
         generator: draws the resamples.
-        reference: float64 [2]; the worst of each measure over all conditions where None.
+        reference: float64 [2]; the worst of each measure over all conditions if None.
         paired: draw the same trials in all conditions (common random numbers).
         resamples: how many.
 
@@ -99,7 +99,7 @@ def compare_hypervolumes(
     def covered(method: str, points: np.ndarray) -> np.ndarray:
         return hypervolume(points[..., places[method], :], below)
 
-    def estimated(method: str) -> Estimate:
+    def estimated(method: str) -> IntervalEstimate:
         found = function_interval(lambda points: covered(method, points), means, resampled)
         return found._replace(low=max(0.0, found.low))
 

@@ -1,4 +1,4 @@
-"""What is measured: a row a trial, a row a condition, and curves over episodes."""
+"""What is measured: a row per trial, a row per condition, and curves over episodes."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -9,16 +9,16 @@ import polars as pl
 from qbumpers.analysis.statistics import mean_interval
 
 MEASURES = {
-    "assisted": "return with the assistant, mean over the training episodes, reward units",
-    "unassisted": "return of the greedy episodes without it, mean over the training, reward units",
+    "assisted": "return of the assisted episodes, mean over the training, reward units",
+    "unassisted": "return of the greedy unassisted episodes, mean over the training, reward units",
     "assisted_last": "assisted return over the last 10% of the training, reward units",
     "unassisted_last": "unassisted return over the last 10% of the training, reward units",
     "assisted_area": "area under the curve of assisted returns, reward units x episodes",
     "unassisted_area": "area under the curve of unassisted returns, reward units x episodes",
-    "overrides": "overrides an episode",
-    "override_rate": "overrides a step, over the whole training",
-    "override_rate_first": "overrides a step, over the first 10% of the training",
-    "override_rate_last": "overrides a step, over the last 10% of the training",
+    "overrides": "overrides per episode",
+    "override_rate": "overrides per step, over the whole training",
+    "override_rate_first": "overrides per step, over the first 10% of the training",
+    "override_rate_last": "overrides per step, over the last 10% of the training",
     "dependence": "assisted minus unassisted return, reward units",
     "dependence_last": "assisted minus unassisted return, last 10% of the training, reward units",
     "retention": "unassisted return over further episodes without the assistant, reward units",
@@ -26,7 +26,7 @@ MEASURES = {
     "unassisted_success": "share of the unassisted episodes that succeed",
     "assisted_crash": "share of the assisted episodes that crash",
     "unassisted_crash": "share of the unassisted episodes that crash",
-    "criterion_episodes": "training episodes until the criterion; all of them where never reached",
+    "criterion_episodes": "training episodes until the criterion; all of them if never reached",
     "criterion_reached": "share of the trials that reach the criterion",
 }
 """Measures of a trial, in the order of tables: what each is, and its unit."""
@@ -39,11 +39,11 @@ _EVENTS = ("assisted_success", "unassisted_success", "assisted_crash", "unassist
 
 
 def trial_measures(episodes: pl.DataFrame, criterion: float | None = None) -> pl.DataFrame:
-    """A row a trial: its measures (macro averages start here).
+    """A row per trial: its measures (macro averages start here).
 
     The first and last 10% are rounded down to whole episodes, at least one. Areas are by
     trapezoids. A trial reaches the criterion with the first of five successive unassisted
-    episodes that do (of all of them, where a trial has fewer); `criterion_episodes` counts the
+    episodes that do (of all of them, if a trial has fewer); `criterion_episodes` counts the
     training episodes up to there. A trial that never does counts with all its episodes, so that
     their mean is a restricted one: at most the mean that longer trials would have.
 
@@ -53,7 +53,7 @@ def trial_measures(episodes: pl.DataFrame, criterion: float | None = None) -> pl
 
     Returns:
         Columns condition, assistant, alpha, learner, trial, and one for each of `MEASURES`; null
-        where unknown. Conditions in the order of the episodes, trials by number.
+        if unknown. Conditions in the order of the episodes, trials by number.
     """
     training = episodes.filter(~pl.col("retention"))
     measured = _training_measures(training)
@@ -143,7 +143,7 @@ def trial_samples(trials: pl.DataFrame, *measures: str) -> dict[str, np.ndarray]
         *measures: M columns.
 
     Returns:
-        float64 [T, M] by condition, in the order of the experiment, trials by number; NaN where a
+        float64 [T, M] by condition, in the order of the experiment, trials by number; NaN if a
         measure is unknown.
     """
     parts = trials.partition_by("condition", as_dict=True, maintain_order=True)
@@ -159,13 +159,13 @@ def summary(
     episodes: int,
     retention: int = 0,
 ) -> pl.DataFrame:
-    """A row a condition: means over trials with 95% intervals over trials.
+    """A row per condition: means over trials with 95% intervals over trials.
 
     Args:
         trials: from `trial_measures`.
         options: of each condition, by its id.
-        episodes: of training, a trial.
-        retention: further episodes without the assistant, a trial.
+        episodes: of training, per trial.
+        retention: further episodes without the assistant, per trial.
 
     Returns:
         The table of `summary.csv`: what a condition is, how much of it was run, and
@@ -190,7 +190,7 @@ def summary(
 
 
 def _columns(measure: str, values: np.ndarray) -> dict[str, float | None]:
-    """The three columns of a measure; null where unknown."""
+    """The three columns of a measure; null if unknown."""
     numbers = mean_interval(values)._asdict() if len(values) else {}
     return {
         f"{measure}_{part}": None if np.isnan(numbers.get(part, np.nan)) else numbers[part]
@@ -206,9 +206,9 @@ def learning_curve(
     Args:
         episodes: as in `episodes.parquet`.
         condition: which one.
-        column: for instance "unassisted_return".
+        column: for example "unassisted_return".
         starts: int [B], the episodes with which blocks begin, the first of them 0; every episode is
-            a block where None.
+            a block if None.
 
     Returns:
         float64 [3, B]: mean, low, high.
@@ -228,7 +228,7 @@ def override_curve(
         starts: int [B] of training, as for `learning_curve`.
 
     Returns:
-        float64 [3, B]: mean, low, high; overrides a step.
+        float64 [3, B]: mean, low, high; overrides per step.
     """
     training = episodes.filter(~pl.col("retention"))
     overrides, steps = (

@@ -7,40 +7,47 @@ from typing import Any
 
 import polars as pl
 
-from qbumpers.analysis.claims import Claim
+from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.figures.style import save
 from qbumpers.analysis.findings import Findings, LearnerFindings, find_tables
 from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.measures import trial_measures
-from qbumpers.analysis.page.drawings import Drawing, drawings
+from qbumpers.analysis.page.drawings import drawings
+from qbumpers.analysis.page.elements import Drawing
 from qbumpers.analysis.page.headlines import cautions, headlines
 from qbumpers.analysis.page.layout import Picture, page
-from qbumpers.analysis.published import Comparison
-from qbumpers.analysis.section_4_1 import ThresholdStory, threshold_story
 from qbumpers.experiments.store import Results, load
 from qbumpers.files import write_atomically
-from qbumpers.values import TabularValues
 
 REPORT, SUMMARY, TRIALS = "report.html", "summary.csv", "trials.parquet"
-"""The page; a row a condition; a row a trial."""
+"""The page; a row per condition; a row per trial."""
 
-METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED, CLAIMS = (
+METHODS, ADVANTAGES, DIFFERENCES, REGRET = (
     "methods.csv",
     "advantages.csv",
     "differences.csv",
     "regret.csv",
-    "published.csv",
-    "claims.csv",
 )
-"""Written where there is something to compare."""
+"""Written if there is something to compare."""
 
 FIGURES = "figures"
-_OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET, PUBLISHED, CLAIMS)
+_OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET)
 _FIGURE_FILES = {".png", ".svg", ".csv"}
 
 
+Add = Callable[[Results, Findings], Additions]
+"""What is added to a report, from the results of a run and their tables."""
+
+
+def nothing(results: Results, findings: Findings) -> Additions:
+    """No additions."""
+    return Additions()
+
+
 def write_report(
-    folder: str | Path, advance: Callable[[str], None] = lambda part: None
+    folder: str | Path,
+    advance: Callable[[str], None] = lambda part: None,
+    add: Add = nothing,
 ) -> Findings:
     """Analyse a finished run: write tables, figures and `report.html` into its folder.
 
@@ -49,38 +56,45 @@ def write_report(
     Args:
         folder: of the run.
         advance: called with the name of each part before it is made.
+        add: finds what is to be added; the reports of published experiments have
+            `qbumpers.reproduction.report.additions`.
 
     Returns:
         What the tables say.
 
     Raises:
-        RequestError: where the folder is not one of a finished run.
-        StoreError: where a file cannot be written.
+        RequestError: if the folder is not one of a finished run.
+        StoreError: if a file cannot be written.
     """
     folder = Path(folder)
     results = load(folder)
     advance("tables")
-    findings = find(results)
+    findings = find(results, add)
     tables = _tables(findings)
     for name, table in tables.items():
         _write(folder / name, table.write_csv().encode())
     _write(folder / TRIALS, _parquet(findings.trials))
-    story = _story(results, findings)
     pictures = []
-    for drawing in drawings(results, findings, story is not None):
+    for drawing in drawings(results, findings):
         advance(f"figure {drawing.name}")
         pictures.append(_picture(folder / FIGURES, drawing))
     advance(REPORT)
-    text = page(folder, results, findings, story, pictures, tables)
+    text = page(folder, results, findings, pictures, tables)
     _write(folder / REPORT, text.encode())
     _clear(folder, {*tables}, {picture.name for picture in pictures})
     return findings
 
 
-def find(results: Results) -> Findings:
-    """Every table of a report and what they say in sentences, from the results of a run."""
+def find(results: Results, add: Add = nothing) -> Findings:
+    """Every table of a report and what they say in sentences.
+
+    Args:
+        results: of the run.
+        add: finds what is to be added.
+    """
     trials = trial_measures(results.episodes, results.experiment.criterion)
     found = find_tables(trials, results.experiment)
+    found = found._replace(additions=add(results, found))
     return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
 
 
@@ -95,8 +109,7 @@ def _tables(findings: Findings) -> dict[str, pl.DataFrame]:
         REGRET: pl.DataFrame(
             [_flat(about, m, r) for about in everyone for m, r in about.regrets.items()]
         ),
-        PUBLISHED: pl.DataFrame([_compared(row) for row in findings.comparisons]),
-        CLAIMS: pl.DataFrame([row for claim in findings.claims for row in _judged(claim)]),
+        **findings.additions.tables,
     }
     return {name: table for name, table in tables.items() if table.height}
 
@@ -117,45 +130,6 @@ def _flat(about: LearnerFindings, matched: str, regret: Regret) -> dict[str, Any
         **{f"method_{part}": number for part, number in regret.method._asdict().items()},
         **{f"reduction_{part}": number for part, number in regret.reduction._asdict().items()},
     }
-
-
-def _compared(row: Comparison) -> dict[str, Any]:
-    return {
-        "what": row.what,
-        "published": row.published,
-        "printed": row.printed,
-        **{f"measured_{part}": number for part, number in row.measured._asdict().items()},
-        "agrees": row.agrees,
-        "note": row.note,
-    }
-
-
-def _judged(claim: Claim) -> list[dict[str, Any]]:
-    return [
-        {
-            "claim": claim.title,
-            "verdict": claim.verdict,
-            "condition": row.condition,
-            "what": row.what,
-            **{f"estimate_{part}": number for part, number in row.estimate._asdict().items()},
-            "wanted": row.wanted,
-            "limit": float(row.limit),
-            "speaks_for": row.speaks_for,
-        }
-        for row in claim.evidence
-    ]
-
-
-def _story(results: Results, findings: Findings) -> ThresholdStory | None:
-    thresholding = findings.summary.filter(assistant="local-q-thresholding")
-    values = results.values
-    if results.experiment.task.name != "cliff-walking" or not thresholding.height:
-        return None
-    if not isinstance(values, TabularValues):
-        return None
-    return threshold_story(
-        values.table, thresholding["alpha"].unique(maintain_order=True).to_list()
-    )
 
 
 def _picture(folder: Path, drawing: Drawing) -> Picture:

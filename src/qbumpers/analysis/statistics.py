@@ -17,12 +17,12 @@ CONFIDENCE = 0.95
 RESAMPLES = 2000
 
 
-class Estimate(NamedTuple):
+class IntervalEstimate(NamedTuple):
     """A number with an interval.
 
     Attributes:
         mean: the estimate.
-        low: lower end of the interval; NaN where it is unknown.
+        low: lower end of the interval; NaN if it is unknown.
         high: upper end.
     """
 
@@ -36,10 +36,10 @@ class Difference(NamedTuple):
 
     Attributes:
         estimate: the difference with its interval.
-        p_value: of the two-sided t test of no difference; NaN where it is unknown.
+        p_value: of the two-sided t test of no difference; NaN if it is unknown.
     """
 
-    estimate: Estimate
+    estimate: IntervalEstimate
     p_value: float
 
 
@@ -50,11 +50,11 @@ def standard_error(samples: np.ndarray) -> float:
     return float(np.std(samples, ddof=1) / np.sqrt(len(samples)))
 
 
-def mean_interval(samples: np.ndarray, confidence: float = CONFIDENCE) -> Estimate:
+def mean_interval(samples: np.ndarray, confidence: float = CONFIDENCE) -> IntervalEstimate:
     """Mean of independent samples with Student's t interval.
 
     Args:
-        samples: float64 [T], one a trial.
+        samples: float64 [T], one per trial.
         confidence: of the interval.
 
     Returns:
@@ -70,17 +70,17 @@ def difference(
     """Difference of the means of two conditions: the t test of pairs, or Welch's.
 
     Args:
-        first: float64 [T], one a trial.
-        second: float64 [U], one a trial; [T] in the same order where paired.
+        first: float64 [T], one per trial.
+        second: float64 [U], one per trial; [T] in the same order if paired.
         paired: whether trials of equal place belong together (common random numbers).
         confidence: of the interval.
 
     Returns:
-        First minus second. Where neither condition varies, the interval has no width and the
+        First minus second. If neither condition varies, the interval has no width and the
         p-value is 0 or 1, the limits of the test's.
 
     Raises:
-        RequestError: where pairs are asked for and the numbers of trials differ.
+        RequestError: if pairs are asked for and the numbers of trials differ.
     """
     mean = float(np.mean(first) - np.mean(second))
     if paired:
@@ -106,24 +106,24 @@ def _partners(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 def _students_t(mean: float, error: float, freedom: float, confidence: float) -> Difference:
     """A mean with its t interval, and the p-value of its being 0."""
     if np.isnan(error):
-        return Difference(Estimate(mean, float("nan"), float("nan")), float("nan"))
+        return Difference(IntervalEstimate(mean, float("nan"), float("nan")), float("nan"))
     margin = float(stdtrit(freedom, (1 + confidence) / 2)) * error
     p_value = 2 * float(stdtr(freedom, -abs(mean) / error)) if error > 0 else float(mean == 0)
-    return Difference(Estimate(mean, mean - margin, mean + margin), p_value)
+    return Difference(IntervalEstimate(mean, mean - margin, mean + margin), p_value)
 
 
 def probability_of_improvement(
     first: np.ndarray, second: np.ndarray, paired: bool = False, confidence: float = CONFIDENCE
-) -> Estimate:
+) -> IntervalEstimate:
     """Probability that a trial of one condition exceeds a trial of another; ties count half.
 
     The interval is Wilson's for a share, at the number of trials that would give a share as
-    precise as this one: that keeps it within [0, 1], and wide enough where one condition always
+    precise as this one: that keeps it within [0, 1], and wide enough if one condition always
     exceeds the other. The precision is that of DeLong, DeLong & Clarke-Pearson (Biometrics, 1988).
 
     Args:
-        first: float64 [T], one a trial.
-        second: float64 [U], one a trial; [T] in the same order where paired.
+        first: float64 [T], one per trial.
+        second: float64 [U], one per trial; [T] in the same order if paired.
         paired: compare trials of equal place only, instead of every trial with every other.
         confidence: of the interval.
 
@@ -131,7 +131,7 @@ def probability_of_improvement(
         P(first > second) + P(first = second) / 2; no interval for a single trial.
 
     Raises:
-        RequestError: where pairs are asked for and the numbers of trials differ.
+        RequestError: if pairs are asked for and the numbers of trials differ.
     """
     if paired:
         wins = 0.5 + np.sign(first - _partners(first, second)) / 2
@@ -144,16 +144,16 @@ def probability_of_improvement(
     return _wilson(float(np.mean(above)), variance, min(len(first), len(second)), confidence)
 
 
-def _wilson(share: float, variance: float, least: int, confidence: float) -> Estimate:
-    """A share with Wilson's interval; its variance tells how many trials it is worth."""
+def _wilson(share: float, variance: float, least: int, confidence: float) -> IntervalEstimate:
+    """A share with Wilson's interval; its variance says how many trials it is worth."""
     if np.isnan(variance):
-        return Estimate(share, float("nan"), float("nan"))
+        return IntervalEstimate(share, float("nan"), float("nan"))
     worth = max(least, share * (1 - share) / variance) if variance > 0 else least
     z = float(ndtri((1 + confidence) / 2))
     centre = (share + z**2 / (2 * worth)) / (1 + z**2 / worth)
     margin = np.sqrt(share * (1 - share) / worth + (z / (2 * worth)) ** 2) * z / (1 + z**2 / worth)
     low, high = max(0.0, centre - margin), min(1.0, centre + margin)
-    return Estimate(share, min(share, float(low)), max(share, float(high)))
+    return IntervalEstimate(share, min(share, float(low)), max(share, float(high)))
 
 
 def holm(p_values: np.ndarray) -> np.ndarray:
@@ -211,12 +211,12 @@ def bootstrap_interval(
     paired: bool = False,
     resamples: int = RESAMPLES,
     confidence: float = CONFIDENCE,
-) -> Estimate:
+) -> IntervalEstimate:
     """A statistic of one or more conditions with SciPy's bootstrap interval over trials.
 
     Args:
         samples: float64 [T] of each condition.
-        statistic: of the samples, one argument a condition, along the keyword `axis`.
+        statistic: of the samples, one argument per condition, along the keyword `axis`.
         generator: draws the resamples.
         method: "BCa" (Efron, JASA, 1987) or "percentile".
         paired: whether trials of equal place are drawn together.
@@ -224,13 +224,13 @@ def bootstrap_interval(
         confidence: of the interval.
 
     Returns:
-        The statistic; no interval for a single trial, one without width where no condition varies.
+        The statistic; no interval for a single trial, one without width if no condition varies.
     """
     found = float(statistic(*samples, axis=-1))
     if min(map(len, samples)) < 2:
-        return Estimate(found, float("nan"), float("nan"))
+        return IntervalEstimate(found, float("nan"), float("nan"))
     if all(np.ptp(values) == 0 for values in samples):
-        return Estimate(found, found, found)
+        return IntervalEstimate(found, found, found)
     low, high = scipy.stats.bootstrap(
         samples,
         statistic,
@@ -243,24 +243,24 @@ def bootstrap_interval(
         method=method,  # type: ignore[arg-type]
         rng=generator,
     ).confidence_interval
-    return Estimate(found, float(low), float(high))
+    return IntervalEstimate(found, float(low), float(high))
 
 
 def percentile_interval(
     estimate: float, replicates: np.ndarray, confidence: float = CONFIDENCE
-) -> Estimate:
+) -> IntervalEstimate:
     """An estimate with the percentile interval of its bootstrap replicates.
 
     Args:
         estimate: from the samples themselves.
-        replicates: float64 [B]; NaN where a replicate has no value.
+        replicates: float64 [B]; NaN if a replicate has no value.
         confidence: of the interval.
 
     Returns:
-        The estimate; no interval where more than 1% of the replicates have no value.
+        The estimate; no interval if more than 1% of the replicates have no value.
     """
     known = replicates[np.isfinite(replicates)]
     if len(known) < 0.99 * len(replicates):
-        return Estimate(estimate, float("nan"), float("nan"))
+        return IntervalEstimate(estimate, float("nan"), float("nan"))
     low, high = np.quantile(known, [(1 - confidence) / 2, (1 + confidence) / 2])
-    return Estimate(estimate, float(low), float(high))
+    return IntervalEstimate(estimate, float(low), float(high))

@@ -1,13 +1,29 @@
 """What the command line prints, and how numbers look there."""
 
+import contextlib
 import math
+import warnings
+from collections.abc import Iterator
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-from qbumpers.analysis.numerals import digits_for
+from qbumpers.analysis.formatting import decimals_for
 
 OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
+
+
+@contextlib.contextmanager
+def expert_warnings_printed() -> Iterator[None]:
+    """Print warnings about action values that are no better than random play, a line each."""
+    from qbumpers.experts import ExpertWarning
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ExpertWarning)
+        yield
+    for warning in caught:
+        ERRORS.print(f"warning: {escape(str(warning.message))}", soft_wrap=True)
 
 
 def table(*columns: str) -> Table:
@@ -19,15 +35,15 @@ def table(*columns: str) -> Table:
 
 
 def interval(mean: float, low: float | None, high: float | None, digits: int = 1) -> str:
-    """A mean with half the width of its interval, where it has one."""
-    digits = digits_for(low, high, digits)
+    """A mean with half the width of its interval, if it has one."""
+    digits = decimals_for(low, high, digits)
     if low is None or high is None or not math.isfinite(low):
         return f"{mean:.{digits}f}"
     return f"{mean:.{digits}f} \N{PLUS-MINUS SIGN} {(high - low) / 2:.{digits}f}"
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it, for instance "3 s" or "2 h 10 min"."""
+    """A time in words, for example "3 s" or "2 h 10 min"."""
     if seconds < 1:
         return "less than a second"
     if seconds < 60:
@@ -37,5 +53,5 @@ def duration(seconds: float) -> str:
 
 
 def typeable(text: str) -> str:
-    """Text with minus signs that a terminal can be searched for."""
+    """Text with the minus signs of a keyboard, which can be searched for in a terminal."""
     return text.replace("\N{MINUS SIGN}", "-")

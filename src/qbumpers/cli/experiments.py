@@ -1,18 +1,30 @@
 """`qbumpers reproduce`, `run` and `report`."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
-from qbumpers.cli.console import OUTPUT, duration, interval, table, typeable
-from qbumpers.cli.expert import warn_of_bad_values
+from qbumpers.cli.console import (
+    OUTPUT,
+    duration,
+    expert_warnings_printed,
+    interval,
+    table,
+    typeable,
+)
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
 from qbumpers.errors import RequestError
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from qbumpers.experiments.design import Experiment
+    from qbumpers.experiments.run import Progress
 
 
 @application.command()
@@ -36,7 +48,9 @@ def reproduce(
     ] = False,
     trials: Annotated[
         int | None,
-        typer.Option(help="Simulated people a condition.", show_default="the paper's", metavar="N"),
+        typer.Option(
+            help="Simulated learners per condition.", show_default="the paper's", metavar="N"
+        ),
     ] = None,
     episodes: Annotated[
         int | None,
@@ -45,7 +59,7 @@ def reproduce(
     alphas: Annotated[
         str | None,
         typer.Option(
-            help="Of every assistant that has an alpha, for instance 0.5,0.8,1.",
+            help="Of every assistant that has an alpha, for example 0.5,0.8,1.",
             show_default="the paper's",
             metavar="A,A,...",
         ),
@@ -53,7 +67,7 @@ def reproduce(
     values: Annotated[
         str | None,
         typer.Option(
-            help="Q values of the assistants: a file, for instance another expert.",
+            help="Q values of the assistants: a file, for example another expert.",
             show_default="the profile's",
             metavar="PATH",
         ),
@@ -63,7 +77,7 @@ def reproduce(
     on: On = None,
     out: Out = None,
 ) -> None:
-    """Repeat an experiment of the paper and hold the results against its numbers.
+    """Repeat an experiment of the paper and compare the results with its numbers.
 
     Writes tables, figures and report.html. A run that was stopped continues where it was, and one
     with more trials than before computes only those. Versions with other episodes, alphas or
@@ -77,7 +91,7 @@ def reproduce(
 
     Example: qbumpers reproduce lunar-lander --alphas 0.8,0.9,1 --trials 4 --episodes 1000
     """
-    from qbumpers.experiments.sources import reproduction
+    from qbumpers.reproduction.experiments import reproduction
 
     with stoppable():
         design = reproduction(
@@ -99,7 +113,7 @@ def _numbers(text: str) -> list[float]:
     except ValueError as error:
         raise RequestError(
             f"alphas = {text!r}; numbers from 0 to 1 with commas between them are needed, for "
-            "instance 0.5,0.8,1"
+            "example 0.5,0.8,1"
         ) from error
 
 
@@ -138,25 +152,25 @@ def report(
         _analyse(folder)
 
 
-def _run(experiment: Any, workers: int | None, on: str | None, out: str | None) -> None:
+def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str | None) -> None:
     from qbumpers.experiments.plan import make_plan
     from qbumpers.experiments.run import run_experiment
 
-    plan = make_plan(experiment)
+    with expert_warnings_printed():
+        plan = make_plan(experiment)
     folder = out or f"results/{experiment.name}"
-    alone = f" and {experiment.retention} alone" if experiment.retention else ""
+    more = f" and {experiment.retention} without the assistant" if experiment.retention else ""
     OUTPUT.print(
         f"[bold]{experiment.name}[/bold]: {len(plan.named)} conditions, {experiment.trials} "
-        f"trials of {experiment.episodes} episodes{alone}, into {escape(folder)}",
+        f"trials of {experiment.episodes} episodes{more}, into {escape(folder)}",
         soft_wrap=True,
     )
-    warn_of_bad_values(plan.task, plan.values)
     with executor_for(workers, on) as executor, TrialProgress("simulating", _announce) as progress:
         run_experiment(plan, folder, executor=executor, report=progress.show)
     _analyse(folder)
 
 
-def _announce(done: Any) -> None:
+def _announce(done: "Progress") -> None:
     if done.trials == done.of:
         OUTPUT.print("All trials are there already.")
         return
@@ -168,25 +182,27 @@ def _announce(done: Any) -> None:
 
 def _analyse(folder: str) -> None:
     with OUTPUT.status("analysing") as status:
-        from qbumpers.analysis.report import REPORT, write_report
+        from qbumpers.analysis.report import REPORT
         from qbumpers.experiments.store import NEEDED
         from qbumpers.files import local_copy
+        from qbumpers.reproduction.printed import PUBLISHED
+        from qbumpers.reproduction.report import write_report
 
         with local_copy(folder, NEEDED) as place:
             findings = write_report(place, advance=lambda part: status.update(f"writing {part}"))
     for learner, rows in findings.summary.group_by("learner", maintain_order=True):
         OUTPUT.print(_summary_table(str(learner[0]), rows))
-    if findings.comparisons:
-        OUTPUT.print(_published_table(findings.comparisons))
+    if PUBLISHED in findings.additions.tables:
+        OUTPUT.print(_published_table(findings.additions.tables[PUBLISHED]))
     for sentence in (*findings.headlines, *findings.cautions):
         OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
     OUTPUT.print(f"Report: [bold]{escape(folder)}/{REPORT}[/bold]", soft_wrap=True)
 
 
-def _summary_table(learner: str, summary: Any) -> Table:
-    """What the conditions of one kind of learner came to, by what tells those apart."""
+def _summary_table(learner: str, summary: "pl.DataFrame") -> Table:
+    """Returns and overrides of the conditions of one kind of learner."""
     own = learner.partition("/")[2]
-    listing = table("condition", "with help", "alone", "overrides")
+    listing = table("condition", "assisted", "unassisted", "overrides")
     for column in listing.columns:
         column.no_wrap = column.header != "condition"  # the narrow give way last
     if own:
@@ -199,18 +215,18 @@ def _summary_table(learner: str, summary: Any) -> Table:
         condition = row["condition"].removesuffix(f"@{own}")
         listing.add_row(condition, *cells, f"{row['overrides_mean']:.2f}")
     listing.caption = (
-        "Mean returns with the assistant and without it, and overrides an episode, with 95% "
-        "intervals over trials."
+        "Mean assisted and unassisted returns, and overrides per episode, with 95% intervals over "
+        "trials."
     )
     return listing
 
 
-def _published_table(comparisons: Any) -> Table:
+def _published_table(comparisons: "pl.DataFrame") -> Table:
     listing = table("number in the paper", "paper", "measured", "agrees")
-    for row in comparisons:
-        digits = 2 if abs(row.published) < 1 else 1
-        verdict = {True: "yes", False: "[red]no[/red]", None: "-"}[row.agrees]
-        mean, low, high = row.measured
+    for row in comparisons.iter_rows(named=True):
+        digits = 2 if abs(row["published"]) < 1 else 1
+        verdict = {True: "yes", False: "[red]no[/red]", None: "-"}[row["agrees"]]
+        mean, low, high = (row[f"measured_{part}"] for part in ("mean", "low", "high"))
         measured = interval(mean, low, high, digits)
-        listing.add_row(row.what, typeable(row.printed), measured, verdict)
+        listing.add_row(row["what"], typeable(row["printed"]), measured, verdict)
     return listing

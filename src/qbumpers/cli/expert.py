@@ -1,16 +1,16 @@
 """`qbumpers expert`."""
 
-import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import rich.progress
 import typer
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
-from qbumpers.cli.console import ERRORS, OUTPUT, table
+from qbumpers.cli.console import OUTPUT, expert_warnings_printed, table
 from qbumpers.errors import RequestError
 
 if TYPE_CHECKING:
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from qbumpers.experts import Recipe
     from qbumpers.experts.checking import MeanWithError
     from qbumpers.experts.choosing import Judgement
-    from qbumpers.tasks import TabularTask, Task
+    from qbumpers.tasks import TabularTask
     from qbumpers.tasks.vector import VectorTask
-    from qbumpers.values import NetworkValues, TabularValues
 
 
 @application.command()
@@ -48,7 +47,7 @@ def expert(
     ] = None,
     discount: Annotated[
         float | None,
-        typer.Option(help="Of a Gymnasium environment, which states none.", metavar="NUMBER"),
+        typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER"),
     ] = None,
     seeds: Annotated[
         int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
@@ -74,57 +73,53 @@ def expert(
     A task with a transition table is solved exactly. Any other is learned by Double DQN, by the
     paper's recipe as it stands, with several seeds. The best is kept: the one with the most
     successes in 100 episodes with 2% random actions; among equals, with 10% random actions; among
-    equals, after 50 random actions at the beginning. Where the task tells no success, mean returns
-    decide instead. Training that was stopped goes on with the seeds that are missing.
+    equals, after 50 random actions at the beginning. If the task has no success, mean
+    returns decide instead. Training that was stopped goes on with the seeds that are missing.
 
     Example: qbumpers expert lunar-lander --out expert.npz
     """
-    from qbumpers.tasks import TabularTask, make_task
+    from qbumpers.experts.selecting import make_recipe
+    from qbumpers.tasks import make_task
 
-    made = make_task(task, discount=discount)
+    made: Any = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     path = out or Path(f"{task.replace('/', '-')}.npz")
     with stoppable():
-        if isinstance(made, TabularTask):
+        if made.states:
             if corrected is not None:
                 raise RequestError(f"--corrected {corrected}: the values of a table are exact")
-            _expert_of_table(made, check, figures, path)
+            _solve_or_check(made, check, figures, path)
             return
         if check is not None:
             _check(made, check, figures)
         else:
-            recipe = _recipe(made, steps, activation, hidden, learning_rate, random_start)
+            recipe = make_recipe(
+                made,
+                steps=steps,
+                hidden=_hidden(hidden),
+                activation=activation,
+                learning_rate=learning_rate,
+                random_start=random_start,
+            )
             _train(made, recipe, list(range(seeds)), path)
         if corrected is not None:
             _correct(made, check or path, corrected)
 
 
-def _recipe(
-    task: "VectorTask", steps: int, activation: str, hidden: str, rate: float, random_start: int
-) -> "Recipe":
-    from qbumpers.errors import checked
-    from qbumpers.experts import Recipe
-
+def _hidden(text: str) -> list[int]:
     try:
-        sizes = tuple(int(size) for size in hidden.split(",") if size)
+        return [int(size) for size in text.split(",") if size]
     except ValueError as error:
         raise RequestError(
-            f"--hidden {hidden}: whole numbers with commas between them are needed"
+            f"--hidden {text}: whole numbers with commas between them are needed"
         ) from error
-    learner = {
-        **Recipe().learner._asdict(),
-        "network": {"hidden": sizes, "activation": activation},
-        "learning_rate": rate,
-        "discount": task.discount,
-    }
-    return Recipe(checked(type(Recipe().learner), learner, "expert"), steps, random_start)
 
 
 def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
-    from qbumpers.experts.choosing import best, judge, train_several, with_provenance
+    from qbumpers.experts import check_expert
+    from qbumpers.experts.selecting import train_best
 
-    work = path.with_name(f"{path.name}.work")
     with _steps_bar() as bar:
         shown = bar.add_task("training", total=recipe.steps * len(seeds))
 
@@ -132,43 +127,30 @@ def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -
             done = seeds.index(seed) * recipe.steps + steps
             bar.update(shown, completed=done, description=f"steps, seed {seed}")
 
-        trained = train_several(task, recipe, seeds, work, report)
-    with OUTPUT.status("judging"):
-        judgements = [judge(task, values) for values in trained]
-    chosen = best(judgements)
-    kept = with_provenance(task, trained[chosen], judgements[chosen], seeds)
-    kept.save(path)
-    OUTPUT.print(_judgements(task, seeds, judgements))
-    warn_of_bad_values(task, kept)
+        found = train_best(task, recipe, seeds, path, report)
+    OUTPUT.print(_judgements(task, seeds, found.judgements))
+    with expert_warnings_printed():
+        check_expert(task, found.values)
     OUTPUT.print(
-        f"Kept seed {seeds[chosen]} in [bold]{escape(str(path))}[/bold]; all of them are in "
-        f"{escape(str(work))}",
+        f"Kept seed {seeds[found.best]} in [bold]{escape(str(path))}[/bold]; all of them are in "
+        f"{escape(str(found.folder))}",
         soft_wrap=True,
     )
 
 
-def _steps_bar() -> Progress:
-    count = TextColumn("{task.completed:,.0f} of {task.total:,.0f}")
-    columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
-    return Progress(*columns, console=OUTPUT)
+def _steps_bar() -> rich.progress.Progress:
+    columns = (
+        rich.progress.TextColumn("{task.description}"),
+        rich.progress.BarColumn(),
+        rich.progress.TextColumn("{task.completed:,.0f} of {task.total:,.0f}"),
+        rich.progress.TimeRemainingColumn(),
+    )
+    return rich.progress.Progress(*columns, console=OUTPUT)
 
 
-def warn_of_bad_values(task: "Task", values: "TabularValues | NetworkValues") -> None:
-    """Say so where a network's values are no better than random play."""
-    from qbumpers.experts import ExpertWarning, check_expert
-    from qbumpers.tasks import TabularTask
-
-    if isinstance(task, TabularTask):
-        return
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", ExpertWarning)
-        check_expert(task, values)
-    for warning in caught:
-        ERRORS.print(f"warning: {escape(str(warning.message))}", soft_wrap=True)
-
-
-def _judgements(task: "VectorTask", names: list[Any], judgements: "list[Judgement]") -> Table:
+def _judgements(
+    task: "VectorTask", names: Sequence[Any], judgements: "Sequence[Judgement]"
+) -> Table:
     kind = "success" if task.has_success else "return"
     listing = table(
         "seed", f"{kind}, 2% random", "10% random", "after 50 random", "greedy return",
@@ -181,8 +163,8 @@ def _judgements(task: "VectorTask", names: list[Any], judgements: "list[Judgemen
         rest = (found.greedy_return, found.start_value, found.start_return)
         listing.add_row(str(name), *merits, *(_number(number, 1) for number in rest), crash)
     listing.caption = (
-        "V of start is what the values claim, achieved what greedy episodes return, both "
-        "discounted. Q at crashes is claimed for the very action that crashed."
+        "V of start is what the values predict, achieved what greedy episodes return, both "
+        "discounted. Q at crashes is predicted for the very action that crashed."
     )
     return listing
 
@@ -192,18 +174,21 @@ def _number(found: "MeanWithError", digits: int) -> str:
 
 
 def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
+    from qbumpers.experts import check_expert
     from qbumpers.experts.choosing import judge
+    from qbumpers.experts.loading import load_network
     from qbumpers.experts.quality import check_values, summarise
 
-    values = _network_of(task, path)
+    values = load_network(task, path)
     OUTPUT.print(f"[bold]{escape(str(path))}[/bold]: {escape(values.method)}", soft_wrap=True)
     with OUTPUT.status("judging"):
         judgement = judge(task, values)
     OUTPUT.print(_judgements(task, ["-"], [judgement]))
-    warn_of_bad_values(task, values)
+    with expert_warnings_printed():
+        check_expert(task, values)
     with OUTPUT.status("going where learners go"):
-        claims = check_values(task, values, discount=values.discount)
-    found = summarise(claims)
+        checks = check_values(task, values, discount=values.discount)
+    found = summarise(checks)
     OUTPUT.print(
         f"- Off the greedy path values differ from what is achieved by {_signed(found.bias)} on "
         f"average, by {_with_error(found.absolute)} in size; {found.overestimated:.0%} are too "
@@ -212,18 +197,19 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
     )
     if found.crash_value is not None and found.crash_return is not None:
         OUTPUT.print(
-            f"- One step before crashes they claim {_with_error(found.crash_value)}; the crash "
+            f"- One step before crashes they predict {_with_error(found.crash_value)}; the crash "
             f"brings {found.crash_return.mean:.1f}.",
             soft_wrap=True,
         )
     if figures is not None:
-        _draw(claims, path, figures)
+        _draw(checks, path, figures)
 
 
 def _correct(task: "VectorTask", path: Path, out: Path) -> None:
     from qbumpers.experts import correcting
+    from qbumpers.experts.loading import load_network
 
-    values = _network_of(task, path)
+    values = load_network(task, path)
     with _steps_bar() as bar:
         shown = bar.add_task("trying actions where learners go", total=correcting.BRANCHES)
         found = correcting.correct_values(
@@ -241,21 +227,6 @@ def _correct(task: "VectorTask", path: Path, out: Path) -> None:
     )
 
 
-def _network_of(task: "VectorTask", path: Path) -> "NetworkValues":
-    from qbumpers.values import NetworkValues, load_values
-
-    values = load_values(path)
-    if not isinstance(values, NetworkValues):
-        raise RequestError(f"values file {path}: a table; task {task.name} needs a network")
-    found, needed = (values.inputs, values.actions), (task.observation_size, task.actions)
-    if values.task != task.name or found != needed:
-        raise RequestError(
-            f"values file {path}: of task {values.task}, {found[0]} inputs and {found[1]} actions; "
-            f"task {task.name} has {needed[0]} and {needed[1]}"
-        )
-    return values
-
-
 def _signed(found: "MeanWithError") -> str:
     return f"{found.mean:+.1f} \N{PLUS-MINUS SIGN} {1.96 * found.error:.1f}"
 
@@ -264,43 +235,30 @@ def _with_error(found: "MeanWithError") -> str:
     return _signed(found).removeprefix("+")
 
 
-def _draw(claims: "pl.DataFrame", path: Path, folder: Path) -> None:
+def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
     from qbumpers.analysis.figures.quality import quality_figure
     from qbumpers.analysis.figures.style import save
 
-    drawn = save(quality_figure([(path.stem, claims)]), folder, f"{path.stem}-quality")
+    drawn = save(quality_figure([(path.stem, checks)]), folder, f"{path.stem}-quality")
     OUTPUT.print(f"Figure: [bold]{escape(str(drawn))}[/bold]", soft_wrap=True)
 
 
-def _expert_of_table(
+def _solve_or_check(
     task: "TabularTask", check: Path | None, figures: Path | None, path: Path
 ) -> None:
-    import numpy as np
-
-    from qbumpers.experts.quality import check_table
-    from qbumpers.values import TabularValues, load_values, solve
+    from qbumpers.experts.loading import load_table
+    from qbumpers.experts.tables import check_exactness
+    from qbumpers.values import solve
 
     if figures is not None:
         raise RequestError(f"--figures {figures}: a table needs none, it is compared exactly")
-    values = solve(task) if check is None else load_values(check)
-    if not isinstance(values, TabularValues) or values.table.shape != (task.states, task.actions):
-        kind = (
-            f"a table {list(values.table.shape)}"
-            if isinstance(values, TabularValues)
-            else "a network"
-        )
-        raise RequestError(
-            f"values file {check}: {kind}; task {task.name} needs a table "
-            f"[{task.states}, {task.actions}]"
-        )
-    found = check_table(task, values, discount=values.discount)
-    errors = (found["value"] - found["exact"]).to_numpy()
-    start = [float(np.max(values(state))) for state in np.flatnonzero(task.start)]
+    values = solve(task) if check is None else load_table(task, check)
+    found = check_exactness(task, values)
     OUTPUT.print(f"{escape(task.name)}: {escape(values.method)}", soft_wrap=True)
     OUTPUT.print(
-        f"V of the start {', '.join(f'{value:g}' for value in start)}; over {found.height} states "
-        f"and actions the error is at most {np.abs(errors).max():.2g}, its mean "
-        f"{errors.mean():.2g}",
+        f"V of the start {', '.join(f'{value:g}' for value in found.start_values)}; over "
+        f"{found.pairs} states and actions the error is at most {found.largest_error:.2g}, its "
+        f"mean {found.mean_error:.2g}",
         soft_wrap=True,
     )
     if check is None:

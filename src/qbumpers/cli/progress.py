@@ -5,36 +5,36 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+import rich.progress
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 from qbumpers.cli.console import ERRORS, OUTPUT, duration
 
 if TYPE_CHECKING:
-    from qbumpers.experiments.run import Progress as Running
-    from qbumpers.tuning import Progress as Tuning
+    from qbumpers.experiments.run import Progress
+    from qbumpers.tuning import TuningProgress
 
 _TRUST = 4  # finished trials that weigh as much as what was expected before the first
 
 
 class TrialProgress:
-    """A bar of trials, with steps a second and the time left.
+    """A bar of trials, with steps per second and the time left.
 
     Args:
-        what: is going on, for instance "simulating".
+        what: is going on, for example "simulating".
         announce: prints what is to be expected, once that is known.
     """
 
     def __init__(self, what: str, announce: Callable[[Any], None]) -> None:
         columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.completed:,.0f} of {task.total:,.0f} trials"),
-            TextColumn("{task.fields[rate]}"),
+            rich.progress.TextColumn("{task.description}"),
+            rich.progress.BarColumn(),
+            rich.progress.TextColumn("{task.completed:,.0f} of {task.total:,.0f} trials"),
+            rich.progress.TextColumn("{task.fields[rate]}"),
             _TimeLeft(),
         )
-        self._bar = Progress(*columns, console=OUTPUT)
+        self._bar = rich.progress.Progress(*columns, console=OUTPUT)
         self._waiting = OUTPUT.status("compiling and calibrating")
         self._what, self._announce = what, announce
         self._begun: float | None = None
@@ -52,7 +52,7 @@ class TrialProgress:
         self._waiting.stop()
         self._bar.stop()
 
-    def show(self, done: "Running | Tuning") -> None:
+    def show(self, done: "Progress | TuningProgress") -> None:
         """Show how far it is."""
         if self._begun is None:
             self._begun = time.monotonic()
@@ -79,17 +79,17 @@ class Before(NamedTuple):
 
     Attributes:
         trials: that were there already.
-        expected: seconds that the others were to take; None where nobody can tell.
+        expected: seconds that the others were to take; None if nobody can tell.
     """
 
     trials: int
     expected: float | None
 
 
-class _TimeLeft(ProgressColumn):
+class _TimeLeft(rich.progress.ProgressColumn):
     """The time left, counted down between one finished trial and the next."""
 
-    def render(self, task: Task) -> Text:
+    def render(self, task: rich.progress.Task) -> Text:
         """See Rich."""
         ends = task.fields["ends"]
         if ends is None or task.finished:
@@ -107,7 +107,7 @@ def time_left(before: Before, trials: int, of: int, seconds: float) -> float | N
         seconds: since the run began.
 
     Returns:
-        The time; None where nothing is known yet.
+        The time; None if nothing is known yet.
     """
     finished, remaining = trials - before.trials, of - trials
     if before.expected is None:
@@ -119,9 +119,9 @@ def time_left(before: Before, trials: int, of: int, seconds: float) -> float | N
 
 
 def rate(steps: int, seconds: float) -> str:
-    """How fast it goes, for instance "4.1 million steps a second"."""
+    """How fast it goes, for example "4.1 million steps per second"."""
     if not steps:
         return ""
     speed = steps / seconds
     number = f"{speed / 1e6:.1f} million" if speed >= 1e5 else f"{speed:,.0f}"
-    return f"{number} steps a second"
+    return f"{number} steps per second"

@@ -1,15 +1,14 @@
 """`qbumpers tune`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
-from qbumpers.cli.console import OUTPUT, interval, table
-from qbumpers.cli.expert import warn_of_bad_values
+from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import On, Out, Workers, executor_for
 
@@ -46,8 +45,8 @@ def tune(
     from qbumpers.experiments.sources import load_experiment
 
     with stoppable():
-        plan = make_plan(load_experiment(experiment))
-        warn_of_bad_values(plan.task, plan.values)
+        with expert_warnings_printed():
+            plan = make_plan(load_experiment(experiment))
         folder = out or f"results/{plan.experiment.name}"
         OUTPUT.print(
             f"[bold]{plan.experiment.name}[/bold]: {len(plan.named)} conditions race, up to "
@@ -55,7 +54,10 @@ def tune(
             f"{escape(folder)}",
             soft_wrap=True,
         )
-        with executor_for(workers, on) as executor, TrialProgress("racing", _quietly) as progress:
+        with (
+            executor_for(workers, on) as executor,
+            TrialProgress("racing", _silent) as progress,
+        ):
             found = tuning.tune(
                 plan, folder, floor, confidence=confidence, executor=executor, report=progress.show
             )
@@ -67,12 +69,12 @@ def tune(
         OUTPUT.print(_choice(found.choice, floor, confidence), soft_wrap=True)
 
 
-def _quietly(_: Any) -> None:
+def _silent(_: object) -> None:
     """A race cannot tell beforehand how long it will take."""
 
 
 def _contenders(found: "Tuning") -> Table:
-    listing = table("condition", "trials", "with help", "alone", "verdict")
+    listing = table("condition", "trials", "assisted", "unassisted", "verdict")
     for column in listing.columns:
         column.no_wrap = column.header != "condition"
     for each in sorted(found.contenders, key=lambda one: one is not found.choice):
@@ -89,14 +91,14 @@ def _cost(found: "Tuning") -> str:
 def _no_choice(found: "Tuning") -> str:
     nearest = found.nearest
     return (
-        f"[bold]No choice[/bold]: no condition is surely above {found.floor:g}. The nearest is "
-        f"{nearest.condition}, {interval(*nearest.assisted)} with help."
+        f"[bold]No choice[/bold]: no condition is significantly above {found.floor:g}. The "
+        f"nearest is {nearest.condition}, {interval(*nearest.assisted)} assisted."
     )
 
 
 def _choice(choice: "Contender", floor: float, confidence: float) -> str:
     return (
         f"[bold]Choice: {choice.condition}[/bold] returns {interval(*choice.assisted)} "
-        f"with help, above {floor:g} with {confidence:.0%} confidence, and "
-        f"{interval(*choice.unassisted)} alone."
+        f"assisted, above {floor:g} with {confidence:.0%} confidence, and "
+        f"{interval(*choice.unassisted)} unassisted."
     )

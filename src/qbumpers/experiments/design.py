@@ -4,7 +4,6 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from pydantic import (
@@ -23,6 +22,9 @@ from qbumpers.experiments.learner_designs import LearnerDesign, apart, by_name, 
 from qbumpers.experiments.models import Model
 from qbumpers.learners import learners
 from qbumpers.tasks import Task, make_task
+
+REPRODUCTIONS = ("cliff-walking", "lunar-lander")
+"""What `reproduces` may name: published experiments, those of `qbumpers.reproduction`."""
 
 
 class TaskDesign(Model):
@@ -169,8 +171,8 @@ class Experiment(Model):
                     f"{self.learners[0].name!r}, the first one, {self.learners[0].observes}: the "
                     "learners of one experiment observe alike"
                 )
-        if self.reproduces is not None and self.reproduces not in reproductions():
-            raise unknown_name("reproduces", self.reproduces, reproductions())
+        if self.reproduces is not None and self.reproduces not in REPRODUCTIONS:
+            raise unknown_name("reproduces", self.reproduces, REPRODUCTIONS)
         return self
 
     @property
@@ -282,15 +284,3 @@ def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
         if option not in defaults or any(other[option] != value for other in others)
     ]
     return "/".join([assistant.name, ",".join(shown)]) if shown else assistant.name
-
-
-def reproductions() -> list[str]:
-    """Names of the published experiments that can be repeated."""
-    files = resources.files("qbumpers.experiments") / "built_in"
-    return sorted(
-        {
-            file.name.removesuffix(".figures.toml")
-            for file in files.iterdir()
-            if file.name.endswith(".figures.toml")
-        }
-    )

@@ -21,6 +21,10 @@ def _known_perception(given: Any) -> Any:
     return given if isinstance(given, str) else _PerceptionDesign.model_validate(given)
 
 
+def _known_motor(given: Any) -> Any:
+    return None if given is None else _MotorDesign.model_validate(given)
+
+
 class LearnerDesign(Model):
     """A simulated learner. In a file, a field given as a list is swept over.
 
@@ -40,7 +44,7 @@ class LearnerDesign(Model):
     name: str
     perception: Annotated[Any, BeforeValidator(_known_perception)] = "transition"
     penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
-    motor: _MotorDesign | None = None
+    motor: Annotated[Any, BeforeValidator(_known_motor)] = None
     forgetting: Annotated[float, Field(ge=0, le=1)] = 0.0
 
     def setup(self, task_discount: float) -> dict[str, Any]:

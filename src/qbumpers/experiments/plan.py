@@ -3,15 +3,16 @@
 import dataclasses
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import Task
+from qbumpers.tasks import Task, VectorTask
 from qbumpers.values import (
     NetworkValues,
     TabularValues,
@@ -63,6 +64,9 @@ def make_plan(experiment: Experiment) -> Plan:
 
     Raises:
         RequestError: where the task, values, a learner or an assistant is wrong.
+
+    Warns:
+        ExpertWarning: if the values of a network are no better than random play.
     """
     task = experiment.task.task()
     for learner in experiment.learners:
@@ -86,6 +90,8 @@ def make_plan(experiment: Experiment) -> Plan:
         content = content_digest([experiment.seed, condition.content()]).hex()
         named.append((each, content))
         conditions[content] = condition
+    if not task.states:
+        check_expert(cast(VectorTask, task), values)
     return Plan(experiment, task, values, named, conditions)
 
 

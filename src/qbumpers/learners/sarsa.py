@@ -15,7 +15,7 @@ from qbumpers.learners.epsilon_greedy import epsilon_greedy
 from qbumpers.learners.interface import Rates, Shape, Transition
 from qbumpers.learners.q_learning import q_update
 from qbumpers.learners.registry import register_learner
-from qbumpers.learners.schedules import Schedule
+from qbumpers.learners.schedules import Schedule, scheduled
 from qbumpers.random_streams import draw
 
 _NONE = -1
@@ -63,7 +63,10 @@ def start(settings: Sarsa, shape: Shape, stream: np.ndarray) -> SarsaMemory:
 def begin(settings: Sarsa, memory: SarsaMemory, episode: int, episodes: int) -> Rates:
     """Exploration and step size of an episode; what was chosen ahead in the last one is dropped."""
     memory.next_choice[0] = _NONE
-    return q_learning.begin(settings, memory, episode, episodes)
+    return Rates(
+        scheduled(settings.epsilon, episode, episodes),
+        scheduled(settings.learning_rate, episode, episodes),
+    )
 
 
 @compiled

@@ -225,7 +225,8 @@ def take(
         perception, proposed, executed, undone, reward,
         noticing(perception, overridden, streams[LEARNER]),
     )  # fmt: skip
-    projected = projected_return(account.earned, account.discount, assistance.row[proposed])
+    value = float(assistance.row[proposed])
+    projected = projected_return(account.earned, account.discount, value)
     if not finite(reward, next_observation):
         return experience.action, projected, rule_memory, False
     step = step_of(

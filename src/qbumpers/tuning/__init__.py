@@ -1,6 +1,6 @@
 """Finding the assistant that teaches best above a required performance."""
 
 from qbumpers.tuning.choosing import Contender, Tuning, tune
-from qbumpers.tuning.trials import Progress
+from qbumpers.tuning.trials import TuningProgress
 
-__all__ = ["Contender", "Progress", "Tuning", "tune"]
+__all__ = ["Contender", "Tuning", "TuningProgress", "tune"]

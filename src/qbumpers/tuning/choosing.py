@@ -6,8 +6,8 @@ trials together; those that are confidently below the floor or teach confidently
 best one so far stop early, so that trials are spent where the choice is close.
 
 What is said of the choice does not rest on the race, whose winner looks better than it is. With N
-trials a condition in the experiment, the race uses trials 0 to N - 1. Its winner is then measured
-on trials N to 2N - 1, which had no part in choosing it. It is confirmed where the lower end of
+trials per condition in the experiment, the race uses trials 0 to N - 1. Its winner is then measured
+on trials N to 2N - 1, which had no part in choosing it. It is confirmed if the lower end of
 Student's two-sided interval of its assisted return, at the stated confidence 1 - d, is above the
 floor: the chance of that is at most d/2 for a condition that is not above it. A winner that is not
 confirmed leaves, the race is decided again among the others, and the next winner's intervals have
@@ -24,7 +24,7 @@ from typing import NamedTuple
 import polars as pl
 import tomli_w
 
-from qbumpers.analysis.statistics import CONFIDENCE, Estimate, mean_interval
+from qbumpers.analysis.statistics import CONFIDENCE, IntervalEstimate, mean_interval
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import NamedCondition
@@ -34,10 +34,10 @@ from qbumpers.experiments.run import Executor
 from qbumpers.experiments.store import open_store
 from qbumpers.files import open_folder
 from qbumpers.tuning.race import CHOSEN, UNCONFIRMED, Race, quiet
-from qbumpers.tuning.trials import Progress, Trials
+from qbumpers.tuning.trials import Trials, TuningProgress
 
 TABLE, CHOICE = "tuning.csv", "tuning.toml"
-"""Files that are added to the output folder: a row a condition, and the choice."""
+"""Files that are added to the output folder: a row per condition, and the choice."""
 
 
 class Contender(NamedTuple):
@@ -48,17 +48,17 @@ class Contender(NamedTuple):
         assistant: the assistant.
         trials: spent on it.
         assisted: return with the assistant, in reward units.
-        unassisted: return without it, in reward units. Both are of fresh trials alone where the
+        unassisted: the same without it. Both are of fresh trials alone if the
             condition was measured anew (chosen, or not confirmed), else of those of the race.
         confidence: of these intervals.
-        verdict: for instance "teaches worse".
+        verdict: for example "teaches worse".
     """
 
     condition: str
     assistant: Assistant
     trials: int
-    assisted: Estimate
-    unassisted: Estimate
+    assisted: IntervalEstimate
+    unassisted: IntervalEstimate
     confidence: float
     verdict: str
 
@@ -80,7 +80,7 @@ class Tuning(NamedTuple):
 
     @property
     def choice(self) -> Contender | None:
-        """The condition that teaches best above the floor; None where none is confirmed above."""
+        """The condition that teaches best above the floor; None if none is confirmed above."""
         chosen = [each for each in self.contenders if each.verdict == CHOSEN]
         return chosen[0] if chosen else None
 
@@ -96,7 +96,7 @@ class Tuning(NamedTuple):
 
     @property
     def saved(self) -> float:
-        """Share of the whole experiment's trials that were not needed; negative where more were."""
+        """Share of the whole experiment's trials that were not needed; negative if more were."""
         return 1 - self.trials / self.grid_trials
 
 
@@ -107,7 +107,7 @@ def tune(
     *,
     confidence: float = CONFIDENCE,
     executor: Executor | None = None,
-    report: Callable[[Progress], None] = lambda progress: None,
+    report: Callable[[TuningProgress], None] = lambda progress: None,
 ) -> Tuning:
     """Find the condition that teaches best among those that perform above a floor.
 
@@ -120,16 +120,16 @@ def tune(
         folder: of the results; tuning that was killed continues there.
         floor: assisted return that is needed, in reward units.
         confidence: that the choice is above the floor; the module says how it is meant.
-        executor: where to run; threads on all cores of this machine where None.
+        executor: where to run; threads on all cores of this machine if None.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Returns:
         The choice, if there is one, and what became of all conditions.
 
     Raises:
-        RequestError: where Optuna is not installed, the experiment has several learners or a
+        RequestError: if Optuna is not installed, the experiment has several learners or a
             single trial, the floor or confidence is out of range, or as `run_experiment`.
-        StoreError: where results cannot be written; finished cells stay.
+        StoreError: if results cannot be written; finished cells stay.
     """
     _check(plan, floor, confidence)
     with quiet(), open_store(folder, plan.experiment) as store:

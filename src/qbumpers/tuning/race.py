@@ -21,7 +21,7 @@ CHOSEN, UNCONFIRMED, KEPT, WORSE, BELOW, UNSURE = (
     "kept to the end",
     "teaches worse",
     "below the floor",
-    "not surely above the floor",
+    "not significantly above the floor",
 )
 """What became of a condition."""
 
@@ -88,7 +88,7 @@ class Race:
                 self._leave(content, WORSE)
 
     def _finish(self, content: str) -> None:
-        """Look at all trials of a condition; it is kept where it is surely above the floor."""
+        """Look at all trials of a condition; it is kept if it is significantly above the floor."""
         self._look([content], self._trials.length)
         if content not in self._racing:
             return

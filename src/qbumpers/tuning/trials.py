@@ -13,7 +13,7 @@ from qbumpers.experiments.run import Executor
 from qbumpers.experiments.store import EPISODES, Store
 
 
-class Progress(NamedTuple):
+class TuningProgress(NamedTuple):
     """How far the tuning is.
 
     Attributes:
@@ -32,7 +32,7 @@ class Progress(NamedTuple):
 class Trials:
     """The trials of a plan's conditions, run when they are needed and kept in the store.
 
-    With N trials a condition in the experiment, trials 0 to N - 1 are for races, and trials N to
+    With N trials per condition in the experiment, trials 0 to N - 1 are for races, and trials N to
     2N - 1 for measuring anew.
 
     Args:
@@ -49,7 +49,7 @@ class Trials:
     """
 
     def __init__(
-        self, plan: Plan, store: Store, executor: Executor, report: Callable[[Progress], None]
+        self, plan: Plan, store: Store, executor: Executor, report: Callable[[TuningProgress], None]
     ) -> None:
         self.contents = list(plan.conditions)
         self.length = plan.experiment.trials
@@ -60,7 +60,7 @@ class Trials:
         survey = store.survey(self.contents)
         self._cells = survey.cells
         self._seconds = estimated_seconds(plan, [Cell(c, 0, 1) for c in self.contents])
-        self._progress = Progress(0, self.length * len(self.contents), 0, survey.damaged)
+        self._progress = TuningProgress(0, self.length * len(self.contents), 0, survey.damaged)
         report(self._progress)
 
     def race(self, contents: Collection[str], trials: int) -> None:
@@ -83,7 +83,7 @@ class Trials:
         return self._means[content][self.length :].T
 
     def _look(self, wanted: list[Cell]) -> None:
-        """Have trials read, and run first where they are missing."""
+        """Have trials read, and run first if they are missing."""
         size = self._plan.experiment.trials_a_cell()
         missing = [cell for span in wanted for cell in gaps(span, self._cells[span.content], size)]
         rates = {cell.content: seconds for cell, seconds in self._seconds.items()}
@@ -92,10 +92,10 @@ class Trials:
             for finished in work:
                 self._store.write(finished.cell, finished.files)
                 self._cells[finished.cell.content].append(finished.cell)
-                self._tell(finished.cell.trials, finished.steps)
+                self._advance(finished.cell.trials, finished.steps)
         for span in wanted:
             self._read(span)
-        self._tell(sum(cell.trials for cell in wanted) - sum(cell.trials for cell in missing), 0)
+        self._advance(sum(cell.trials for cell in wanted) - sum(cell.trials for cell in missing), 0)
 
     def _read(self, span: Cell) -> None:
         means = self._means[span.content]
@@ -105,7 +105,7 @@ class Trials:
                 found = trial_returns(self._store.read(cell, EPISODES))
                 means[cell.first : cell.end] = found[: len(means) - cell.first]
 
-    def _tell(self, trials: int, steps: int) -> None:
+    def _advance(self, trials: int, steps: int) -> None:
         self._progress = self._progress._replace(
             trials=self._progress.trials + trials, steps=self._progress.steps + steps
         )

@@ -40,8 +40,8 @@ def test_every_condition_is_a_line_with_a_band_in_both_panels():
     table = episodes_of()
     drawing = drawn_from(table)
     assert [axes.get_title(loc="left") for axes in drawing.axes] == [
-        "With the assistant",
-        "Without it",
+        "Assisted",
+        "Unassisted",
     ]
     for axes, column in zip(drawing.axes, ("assisted_return", "unassisted_return"), strict=True):
         assert (axes.get_xlabel(), axes.get_ylabel()) == ("episode", "return")

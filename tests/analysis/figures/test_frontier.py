@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from qbumpers.analysis.figures.frontier import frontier_figure, overriding
+from qbumpers.analysis.figures.frontier import Marks, frontier_figure, overriding
 from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN
 from qbumpers.analysis.figures.style import looks, setting
 from tests.analysis.examples import (
@@ -16,7 +16,7 @@ from tests.analysis.examples import (
 
 CLOSE = {f"local-q-thresholding/alpha=0.01{digit}": 0.01 + digit / 1000 for digit in range(10)}
 EVERYTHING = {"none": None, "maximal": None, **CLOSE, **BUMPERS}
-AXES = ("mean return with the assistant", "mean return without it")
+AXES = ("mean assisted return", "mean unassisted return")
 LABELS = {
     "none": "No assistance",
     "maximal": "Maximal assistance",
@@ -40,8 +40,8 @@ def table_of(conditions=EVERYTHING):
     return table.with_columns(pareto=pl.Series([not beaten(point, points) for point in points]))
 
 
-def drawn_from(table, *published):
-    return frontier_figure(table, looks(table["assistant"]), *published)
+def drawn_from(table, marks=None):
+    return frontier_figure(table, looks(table["assistant"]), marks)
 
 
 def titles(drawing):
@@ -153,25 +153,18 @@ def test_two_clusters_are_both_enlarged_with_every_label():
     drawing.draw_without_rendering()
 
 
-def test_printed_points_are_hollow_stars_where_both_numbers_are_printed():
-    [both, one, *_] = BUMPERS
-    printed = [
-        {"condition": both, "measure": "assisted", "value": 66.6},
-        {"condition": both, "measure": "unassisted", "value": -465.6},
-        {"condition": one, "measure": "assisted", "value": 53.9},
-        {"condition": "absent/alpha=1", "measure": "assisted", "value": 1.0},
-        {"condition": "absent/alpha=1", "measure": "unassisted", "value": 2.0},
-    ]
-    drawing = drawn_from(table_of(), printed)
+def test_marks_of_drawn_conditions_are_hollow_stars():
+    points = {next(iter(BUMPERS)): (66.6, -465.6), "absent/alpha=1": (1.0, 2.0)}
+    drawing = drawn_from(table_of(), Marks("as printed elsewhere", points))
     assert marked(drawing.axes[0], "*") == [(66.6, -465.6)]
     assert marked(drawing.axes[1], "*") == []  # all conditions: measured ones alone
     low, high = drawing.axes[0].get_ylim()
     assert low < -465.6 < high
-    assert legend_of(drawing) == [*LABELS.values(), "Pareto-optimal", "as printed in the paper"]
+    assert legend_of(drawing) == [*LABELS.values(), "Pareto-optimal", "as printed elsewhere"]
 
 
-def test_without_printed_numbers_the_legend_mentions_none():
-    assert "as printed in the paper" not in legend_of(drawn_from(table_of()))
+def test_without_marks_the_legend_has_none():
+    assert legend_of(drawn_from(table_of())) == [*LABELS.values(), "Pareto-optimal"]
 
 
 def test_where_all_conditions_override_one_panel_shows_them():

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from qbumpers.analysis.figures.heatmaps import cell_counts, heatmap_figure
+from qbumpers.analysis.figures.heatmaps import heatmap_figure, visit_counts
 
 CONDITIONS = ["none", "stochastic-q-bumpers/alpha=0.7"]
 COUNTS = ("assisted", "overridden", "unassisted")
@@ -26,7 +26,7 @@ def states():
 
 
 def drawn_from(table, conditions=CONDITIONS):
-    return heatmap_figure(cell_counts(table, conditions, EPISODES))
+    return heatmap_figure(visit_counts(table, conditions, EPISODES))
 
 
 def maps_of(drawing):
@@ -62,16 +62,16 @@ def test_maps_stand_apart_with_square_cells():
 def test_rows_and_maps_are_named_and_share_one_scale():
     drawing = drawn_from(states())
     texts = sorted(drawing.axes[0].texts, key=lambda t: t.get_position()[::-1])
-    maps = ["steps with the assistant", "overridden steps", "steps without it"]
+    maps = ["assisted steps", "overridden steps", "unassisted steps"]
     names = ["No assistance", "Stochastic Q Bumpers, α = 0.7"]
     assert [text.get_text() for text in texts] == [names[0], *maps, names[1], *maps]
     assert len({image.norm for image in maps_of(drawing)}) == 1
     [bar] = [axes for axes in drawing.axes if not axes.images]
-    assert bar.get_xlabel() == "steps an episode"
+    assert bar.get_xlabel() == "steps per episode"
 
 
 def test_the_numbers_behind_the_maps_are_in_the_order_asked_for():
-    counts = cell_counts(states(), CONDITIONS[::-1], EPISODES)
+    counts = visit_counts(states(), CONDITIONS[::-1], EPISODES)
     assert counts["condition"].unique(maintain_order=True).to_list() == CONDITIONS[::-1]
     first = counts.row(0, named=True)
     [state] = states().filter(condition=CONDITIONS[1], state=0).to_dicts()

@@ -1,4 +1,4 @@
-"""Returns, successes and crashes, without the assistant against with it."""
+"""Unassisted returns, successes and crashes against assisted ones."""
 
 import numpy as np
 import polars as pl
@@ -48,7 +48,7 @@ def test_a_panel_a_measure_has_every_condition_as_a_point():
     assert len(drawing.axes) == 3
     for axes, (pair, title) in zip(drawing.axes, PANELS.items(), strict=True):
         assert axes.get_title(loc="left") == title
-        assert (axes.get_xlabel(), axes.get_ylabel()) == ("with the assistant", "without it")
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("assisted", "unassisted")
         factor = 1 if "Return" in title else 100
         for label, points in points_of(axes).items():
             [name] = [name for name, text in NAMES.items() if text == label]

@@ -5,17 +5,17 @@ import math
 import polars as pl
 import pytest
 
+from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.findings import Findings, LearnerFindings
 from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.page.headlines import cautions, headlines
-from qbumpers.analysis.published import Comparison
-from qbumpers.analysis.statistics import Estimate
+from qbumpers.analysis.statistics import IntervalEstimate
 from qbumpers.experiments.sources import make_experiment
 from tests.analysis.examples import summary_table
 from tests.experiments.examples import settings
 
-NAN = Estimate(math.nan, math.nan, math.nan)
-SOME = Estimate(-300.0, -320.0, -280.0)
+NAN = IntervalEstimate(math.nan, math.nan, math.nan)
+SOME = IntervalEstimate(-300.0, -320.0, -280.0)
 METHODS = pl.DataFrame(
     {
         "assistant": ["none", "stochastic-q-bumpers"],
@@ -56,20 +56,20 @@ def about(learner="q-learning", regrets=(), trials=30):
     )
 
 
-def told(*learners):
-    return headlines(Findings(summary_table(), pl.DataFrame(), list(learners), []))
+def sentences_on(*learners):
+    return headlines(Findings(summary_table(), pl.DataFrame(), list(learners)))
 
 
 @pytest.mark.parametrize(
     ("method", "reduction", "sentence"),
     [
-        (SOME, Estimate(0.514, 0.42, 0.615),
+        (SOME, IntervalEstimate(0.514, 0.42, 0.615),
          "At matched performance, Stochastic Q Bumpers has 51% less regret in learning than Local "
          "Q-Thresholding (95% interval of the reduction 42% to 62%)."),
-        (SOME, Estimate(-0.05, -0.13, 0.01),
+        (SOME, IntervalEstimate(-0.05, -0.13, 0.01),
          "At matched performance, Stochastic Q Bumpers has 5% more regret in learning than Local "
          "Q-Thresholding (95% interval of the reduction \N{MINUS SIGN}13% to 1%)."),
-        (SOME, Estimate(0.5, math.nan, math.nan),
+        (SOME, IntervalEstimate(0.5, math.nan, math.nan),
          "At matched performance, Stochastic Q Bumpers has 50% less regret in learning than Local "
          "Q-Thresholding (its interval is not known)."),
         (NAN, NAN,
@@ -82,43 +82,43 @@ def told(*learners):
     ids=["less", "more", "few", "out-of-reach", "best"],
 )  # fmt: skip
 def test_regret_is_told_first(method, reduction, sentence):
-    assert told(about(regrets={"performance": regret(method, reduction)}))[0] == sentence
+    assert sentences_on(about(regrets={"performance": regret(method, reduction)}))[0] == sentence
 
 
 def test_settings_methods_and_differences_are_told():
     minus = "\N{MINUS SIGN}"
-    assert told(about()) == [
+    assert sentences_on(about()) == [
         "Stochastic Q Bumpers covers 90% of the performance and learning that all conditions cover "
         "together, the most of all methods (in 98% of the resamples).",
         f"No assistance returns {minus}300.0 ± 1.5 in training and {minus}100.0 ± 35.0 in greedy "
         "episodes.",
-        f"Maximal assistance returns 87.0 ± 1.5 with it, {minus}110.0 ± 35.0 without it.",
-        f"Local Q-Thresholding teaches best at α = 0.010: 50.2 ± 1.5 with it, {minus}120.0 ± 35.0 "
-        f"without it; and performs best at α = 0.014: 50.6 ± 1.5 with it, {minus}160.0 ± 35.0 "
-        "without it.",
-        f"Stochastic Q Bumpers both teaches and performs best at α = 0.2: 72.0 ± 1.5 with it, "
-        f"{minus}170.0 ± 35.0 without it.",
-        "Against no assistance, of 2 conditions 1 surely perform better and 0 worse, 0 surely "
-        "teach better and 2 worse (95% for all at once).",
+        f"Maximal assistance returns 87.0 ± 1.5 assisted, {minus}110.0 ± 35.0 unassisted.",
+        f"Local Q-Thresholding teaches best at α = 0.010: 50.2 ± 1.5 assisted, {minus}120.0 ± 35.0 "
+        f"unassisted; and performs best at α = 0.014: 50.6 ± 1.5 assisted, {minus}160.0 ± 35.0 "
+        "unassisted.",
+        f"Stochastic Q Bumpers both teaches and performs best at α = 0.2: 72.0 ± 1.5 assisted, "
+        f"{minus}170.0 ± 35.0 unassisted.",
+        "Against no assistance, of 2 conditions 1 perform significantly better and 0 worse, 0 "
+        "teach significantly better and 2 worse (95% for all at once).",
     ]
 
 
-def test_single_trials_are_not_called_sure():
-    assert not any("resamples" in sentence for sentence in told(about(trials=1)))
+def test_single_trials_are_not_called_significant():
+    assert not any("resamples" in sentence for sentence in sentences_on(about(trials=1)))
     unknown = DIFFERENCES.with_columns(simultaneous_low=pl.lit(None, pl.Float64))
-    sentences = told(about()._replace(differences=unknown))
-    assert not any("surely" in sentence for sentence in sentences)
+    sentences = sentences_on(about()._replace(differences=unknown))
+    assert not any("significantly" in sentence for sentence in sentences)
 
 
 def test_sentences_on_one_of_several_learners_say_which():
-    found = told(about("q-learning/penalty=1"), about("q-learning/penalty=2"))
+    found = sentences_on(about("q-learning/penalty=1"), about("q-learning/penalty=2"))
     half = len(found) // 2
     assert all(sentence.startswith("With penalty=1: ") for sentence in found[:half])
     assert all(sentence.startswith("With penalty=2: ") for sentence in found[half:])
 
 
-def warned(comparisons=(), learner=None, **changes):
-    findings = Findings(summary_table(), pl.DataFrame(), [learner or about()], list(comparisons))
+def warned(learner=None, **changes):
+    findings = Findings(summary_table(), pl.DataFrame(), [learner or about()])
     return cautions(findings, make_experiment(settings(**{"trials": 20, **changes})))
 
 
@@ -126,13 +126,14 @@ def test_small_experiments_are_cautioned_about():
     assert "one trial" in warned(trials=1)[0]
     assert "only 19 trials" in warned(trials=19)[0]
     assert "one episode" in warned(episodes=1)[0]
-    assert not any("trials a condition" in sentence for sentence in warned())
+    assert not any("trials per condition" in sentence for sentence in warned())
 
 
-def test_disagreement_with_the_paper_is_cautioned_about():
-    verdicts = [True, False, None, False]
-    rows = [Comparison("x", 1.0, "1", SOME, verdict, "") for verdict in verdicts]
-    assert warned(rows)[0].startswith("2 of 4 numbers that the paper prints disagree")
+def test_what_is_added_is_told_too():
+    added = Additions(headlines=["First."], cautions=["Beware."])
+    findings = Findings(summary_table(), pl.DataFrame(), [about()], added)
+    assert headlines(findings)[0] == "First."
+    assert "Beware." in cautions(findings, make_experiment(settings(trials=20)))
 
 
 def test_settings_as_good_as_the_best_are_counted():

@@ -26,11 +26,11 @@ _UNITS = {
     "success": "episodes that succeed, per cent",
     "crash": "episodes that crash, per cent",
 }
-_PANELS = {"assisted": "With the assistant", "unassisted": "Without it"}
+_PANELS = {"assisted": "Assisted", "unassisted": "Unassisted"}
 
 
 def representative(summary: pl.DataFrame, each: int = 2) -> list[str]:
-    """A few conditions that stand for the rest.
+    """A few conditions that represent the rest.
 
     Args:
         summary: rows of `summary.csv`, of one learner.
@@ -88,7 +88,7 @@ def learning_curves(
         measure: "return", "success" or "crash".
 
     Returns:
-        A row a condition and episode, or block of episodes where there are more than
+        A row per condition and episode, or block of episodes if there are more than
         `MOST_POINTS`: condition, episode (from 1; the middle of a block), retention, and `_mean`,
         `_low` and `_high` of the measure's `assisted_` and `unassisted_` column.
     """
@@ -110,7 +110,7 @@ def override_courses(episodes: pl.DataFrame, conditions: Sequence[str]) -> pl.Da
         conditions: which ones.
 
     Returns:
-        A row a condition and episode, or block of episodes as for `learning_curves`: condition,
+        A row per condition and episode, or block of episodes as for `learning_curves`: condition,
         episode (from 1; the middle of a block), `override_rate_mean`, `_low` and `_high`.
     """
     blocks = _blocks(episodes.filter(~pl.col("retention")))
@@ -133,7 +133,7 @@ def _course(condition: str, curves: Mapping[str, np.ndarray], middles: np.ndarra
 def curves_figure(
     curves: pl.DataFrame, drawn: Mapping[str, Look], measure: str = "return"
 ) -> Figure:
-    """A measure by episode with the assistant and, after each, without it.
+    """A measure by episode, assisted and, after each, unassisted.
 
     Args:
         curves: from `learning_curves`.
@@ -185,7 +185,7 @@ def _percentages(curves: pl.DataFrame, column: str) -> pl.DataFrame:
 
 
 def _draw(axes: Axes, curves: pl.DataFrame, column: str, drawn: Mapping[str, Look]) -> None:
-    """A line with a band for each condition, told apart by colour, marker and dashes."""
+    """A line with a band for each condition, distinguished by colour, marker and dashes."""
     conditions = curves["condition"].unique(maintain_order=True).to_list()
     seen = dict.fromkeys(drawn, 0)
     for place, condition in enumerate(conditions):

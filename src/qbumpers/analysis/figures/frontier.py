@@ -1,4 +1,4 @@
-"""Learning against performance: Figure 2 of the paper, made to be read."""
+"""Learning against performance: unassisted return against assisted return, by condition."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -12,38 +12,53 @@ from matplotlib.lines import Line2D
 from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN, label_in_column, room_for_labels
 from qbumpers.analysis.figures.style import NAMES, Look, figure, setting
 
-_AXES = {"xlabel": "mean return with the assistant", "ylabel": "mean return without it"}
+_AXES = {"xlabel": "mean assisted return", "ylabel": "mean unassisted return"}
 _MAIN_SIZE = np.array([9.0, 4.6])  # of the main panel, in inches, about
 _CLUSTER = 3  # so many labels without room make a cluster, which is enlarged
 _RING: Any = {"marker": "o", "markerfacecolor": "none", "color": "#222222"}
 _STAR: Any = {"marker": "*", "markerfacecolor": "none", "linestyle": "none"}
 
 
+class Marks(NamedTuple):
+    """Points to compare those of conditions with, drawn as hollow stars.
+
+    Attributes:
+        label: what they are, in the legend.
+        points: assisted and unassisted return, by the condition that each belongs to.
+    """
+
+    label: str
+    points: Mapping[str, tuple[float, float]]
+
+
+NO_MARKS = Marks("", {})
+
+
 class _Content(NamedTuple):
     points: pl.DataFrame
-    published: Sequence[Mapping[str, Any]]
+    marks: Marks
     looks: Mapping[str, Look]
 
 
 def frontier_figure(
     points: pl.DataFrame,
     drawn: Mapping[str, Look],
-    published: Sequence[Mapping[str, Any]] = (),
+    marks: Marks | None = None,
 ) -> Figure:
     """Unassisted against assisted return of every condition of one learner, with 95% intervals.
 
     Above, the assistants that override; below, all conditions, and tight clusters enlarged.
 
     Args:
-        points: a row a condition: condition, assistant, `assisted_` and `unassisted_` mean, low
+        points: a row per condition: condition, assistant, `assisted_` and `unassisted_` mean, low
             and high, overrides_mean, pareto.
         drawn: looks of the assistants.
-        published: printed numbers (condition, measure, value), drawn as hollow stars.
+        marks: points to compare with, drawn as hollow stars; None for none.
 
     Returns:
         The figure.
     """
-    content = _Content(points, published, drawn)
+    content = _Content(points, marks or NO_MARKS, drawn)
     main = overriding(points)
     if main.height in (0, points.height):
         main = points
@@ -61,7 +76,7 @@ def frontier_figure(
         panels = parts[1].subplots(1, len(below), squeeze=False)[0] if below else []
         for panel, rows in zip(panels, below, strict=True):
             if rows is points:
-                _draw(panel, rows, content._replace(published=()), 5)
+                _draw(panel, rows, content._replace(marks=NO_MARKS), 5)
                 panel.set(title="All conditions")
             else:
                 _draw(panel, rows, content, 5)
@@ -71,7 +86,7 @@ def frontier_figure(
 
 
 def overriding(points: pl.DataFrame) -> pl.DataFrame:
-    """Conditions whose assistant overrides; the swept ones of them, where there are any."""
+    """Conditions whose assistant overrides; the swept ones of them, if there are any."""
     found = points.filter(pl.col("overrides_mean") > 0)
     swept = found.filter(pl.col("condition").str.contains("/", literal=True))
     return swept if swept.height else found
@@ -93,11 +108,11 @@ def draw_points(
 
     Args:
         axes: to draw on.
-        rows: a row a condition: assistant, and mean, low and high of both measures.
+        rows: a row per condition: assistant, and mean, low and high of both measures.
         drawn: looks of the assistants.
         size: of markers, in points.
         measures: to the right and upwards.
-        line: style of what joins the conditions of an assistant, in their order; none where empty.
+        line: style of what joins the conditions of an assistant, in their order; none if empty.
     """
     for part in rows.partition_by("assistant", maintain_order=True):
         name = str(part["assistant"][0])
@@ -120,7 +135,7 @@ def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> Non
     """Points with their intervals, rings around Pareto-optimal ones, and what they bound."""
     draw_points(axes, rows, content.looks, size)
     axes.plot(*_places(rows.filter("pareto")).T, linestyle="none", markersize=2.1 * size, **_RING)
-    for place, ink in _printed(rows, content):
+    for place, ink in _marked(rows, content):
         axes.plot(*place, markersize=17, markeredgewidth=1.6, color=ink, zorder=5, **_STAR)
     best = _places(content.points.filter("pareto").sort("assisted_mean")).T
     axes.plot(
@@ -130,17 +145,14 @@ def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> Non
     axes.set(**_AXES)
 
 
-def _printed(rows: pl.DataFrame, content: _Content) -> list[tuple[tuple[float, float], str]]:
-    """Printed points and their colours; a condition needs both numbers to be one."""
-    found = []
-    for condition, name in rows.select("condition", "assistant").iter_rows():
-        numbers = {
-            n["measure"]: n["value"] for n in content.published if n["condition"] == condition
-        }
-        if len(numbers) == 2:
-            place = (numbers["assisted"], numbers["unassisted"])
-            found.append((place, content.looks[name].colour))
-    return found
+def _marked(rows: pl.DataFrame, content: _Content) -> list[tuple[tuple[float, float], str]]:
+    """The marks of conditions and their colours."""
+    marks = content.marks.points
+    return [
+        (marks[condition], content.looks[name].colour)
+        for condition, name in rows.select("condition", "assistant").iter_rows()
+        if condition in marks
+    ]
 
 
 def _legend(content: _Content) -> list[Line2D]:
@@ -150,17 +162,17 @@ def _legend(content: _Content) -> list[Line2D]:
         if name in content.points["assistant"]
     ]
     ring = Line2D([], [], linestyle=":", markersize=11, label="Pareto-optimal", **_RING)
-    star = Line2D([], [], markersize=13, color="#555555", label="as printed in the paper", **_STAR)
-    return [*handles, ring] + [star] * bool(_printed(content.points, content))
+    star = Line2D([], [], markersize=13, color="#555555", label=content.marks.label, **_STAR)
+    return [*handles, ring] + [star] * bool(_marked(content.points, content))
 
 
 def _limits(rows: pl.DataFrame, content: _Content) -> np.ndarray:
-    """Limits of axes that hold all intervals and printed points; float64 [2, 2]."""
-    printed = np.array([place for place, _ in _printed(rows, content)]).reshape(-1, 2)
+    """Limits of axes that hold all intervals and marks; float64 [2, 2]."""
+    marks = np.array([place for place, _ in _marked(rows, content)]).reshape(-1, 2)
     limits = []
     for axis, measure in enumerate(("assisted", "unassisted")):
         ends = rows.select(f"{measure}_{part}" for part in ("mean", "low", "high"))
-        values = np.append(ends.cast(pl.Float64).to_numpy().ravel(), printed[:, axis])
+        values = np.append(ends.cast(pl.Float64).to_numpy().ravel(), marks[:, axis])
         low, high = np.nanmin(values), np.nanmax(values)
         room = 0.06 * (high - low) or 1.0
         limits.append((low - room, high + room))
@@ -171,8 +183,8 @@ def _label_offsets(rows: pl.DataFrame, limits: np.ndarray, content: _Content) ->
     """Where labels of the main panel may stand, from their points in inches; float64 [N, 2]."""
     order = np.argsort(~rows["pareto"].to_numpy(), kind="stable")
     labels = [_name(str(rows["condition"][int(index)])) for index in order]
-    printed = np.array([place for place, _ in _printed(rows, content)]).reshape(-1, 2)
-    points = np.concatenate([_places(rows)[order], printed])
+    marks = np.array([place for place, _ in _marked(rows, content)]).reshape(-1, 2)
+    points = np.concatenate([_places(rows)[order], marks])
     places = (points - limits[:, 0]) / np.ptp(limits, axis=1) * _MAIN_SIZE
     offsets = np.full((rows.height, 2), np.nan)
     offsets[order] = room_for_labels(places, labels, _MAIN_SIZE)
@@ -184,7 +196,7 @@ def _clusters(rows: pl.DataFrame, offsets: np.ndarray) -> list[pl.DataFrame]:
 
     Args:
         rows: of the main panel.
-        offsets: of their labels, NaN where there is no room.
+        offsets: of their labels, NaN if there is no room.
     """
     marked = rows.with_columns(crowded=pl.Series(np.isnan(offsets[:, 0])))
     parts = marked.partition_by("assistant", maintain_order=True)
@@ -192,7 +204,7 @@ def _clusters(rows: pl.DataFrame, offsets: np.ndarray) -> list[pl.DataFrame]:
 
 
 def _name(condition: str) -> str:
-    """What tells a condition from others of its assistant."""
+    """What distinguishes a condition from others of its assistant."""
     return setting(condition) or NAMES.get(condition, condition)
 
 
@@ -224,7 +236,7 @@ def _thinned(rows: pl.DataFrame) -> pl.DataFrame:
 def _enlarge(axes: Axes, rows: pl.DataFrame, content: _Content) -> None:
     """Look closely at a cluster; labels stand beside it, of Pareto-optimal conditions first."""
     name = str(rows["assistant"][0])
-    (low, high), heights = _limits(rows, content._replace(published=()))
+    (low, high), heights = _limits(rows, content._replace(marks=NO_MARKS))
     axes.set(xlim=(low, high + 0.6 * (high - low)), ylim=heights)
     chosen = _thinned(rows)
     labels = [_name(str(condition)) for condition in chosen["condition"]]

@@ -12,17 +12,17 @@ from matplotlib.figure import Figure
 from qbumpers.analysis.figures.style import figure, readable
 
 _PANELS = {
-    "assisted": "steps with the assistant",
+    "assisted": "assisted steps",
     "overridden": "overridden steps",
-    "unassisted": "steps without it",
+    "unassisted": "unassisted steps",
 }
 _TICKS = (0.001, 0.01, 0.1, 1, 10)
 _WIDTH, _GAP = 10, 0.04  # of the figure in inches; between maps, of a map's width
 _COLOURS = mpl.colormaps["viridis"].with_extremes(bad="#e9e9e9")
 
 
-def cell_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) -> pl.DataFrame:
-    """Steps an episode in each cell of a grid.
+def visit_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) -> pl.DataFrame:
+    """Steps per episode in each cell of a grid.
 
     Args:
         states: as in `states.parquet`, of a task on a grid.
@@ -30,7 +30,7 @@ def cell_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) 
         episodes: over all trials of a condition; counts are divided by it.
 
     Returns:
-        A row a condition and cell: condition, row, column, assisted, overridden, unassisted.
+        A row per condition and grid cell: condition, row, column, assisted, overridden, unassisted.
     """
     chosen = states.filter(pl.col("condition").is_in(list(conditions)))
     order = pl.col("condition").replace_strict({c: i for i, c in enumerate(conditions)})
@@ -40,10 +40,10 @@ def cell_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) 
 
 
 def heatmap_figure(counts: pl.DataFrame) -> Figure:
-    """Steps an episode in each cell of the grid, a row of maps a condition.
+    """Steps per episode in each cell of the grid, a row of maps per condition.
 
     Args:
-        counts: from `cell_counts`.
+        counts: from `visit_counts`.
 
     Returns:
         The figure; grey cells were never entered.
@@ -70,7 +70,7 @@ def heatmap_figure(counts: pl.DataFrame) -> Figure:
         axes.set(xlim=(0, across * len(_PANELS)), ylim=(len(conditions) * down, 0))
         axes.set_axis_off()
         bar = drawing.colorbar(
-            ScalarMappable(norm, _COLOURS), ax=axes, label="steps an episode", location="bottom",
+            ScalarMappable(norm, _COLOURS), ax=axes, label="steps per episode", location="bottom",
             shrink=0.5, aspect=40,
         )  # fmt: skip
         bar.set_ticks(_TICKS, labels=[f"{tick:g}" for tick in _TICKS])

@@ -25,7 +25,7 @@ def room_for_labels(places: np.ndarray, labels: Sequence[str], size: np.ndarray)
         size: of the axes, width and height in inches.
 
     Returns:
-        float64 [len(labels), 2], centres of labels relative to their points, in inches; NaN where
+        float64 [len(labels), 2], centres of labels relative to their points, in inches; NaN if
         there is no room.
     """
     taken = [np.concatenate([place - _POINT, place + _POINT]) for place in places]

@@ -1,4 +1,4 @@
-"""How good action values are: what they claim against what is achieved."""
+"""How good action values are: the returns that they predict against those achieved."""
 
 from collections.abc import Sequence
 
@@ -15,43 +15,43 @@ _MARKERS = ("o", "^")
 _BINS = 8
 
 
-def quality_figure(claims: Sequence[tuple[str, pl.DataFrame]]) -> Figure:
+def quality_figure(checks: Sequence[tuple[str, pl.DataFrame]]) -> Figure:
     """Calibration, bias before crashes, and bias by distance from the expert's path.
 
     Args:
-        claims: one or two sets with their names, from `qbumpers.experts.quality.check_values`.
+        checks: one or two, each with its name, from `qbumpers.experts.quality.check_values`.
 
     Returns:
         The figure; bars are 95% intervals over episodes.
     """
-    visited = [(name, rows.filter(pl.col("policy") != "greedy")) for name, rows in claims]
+    visited = [(name, rows.filter(pl.col("policy") != "greedy")) for name, rows in checks]
     with figure(10, 3.6) as drawing:
         calibration, before, distance = drawing.subplots(1, 3)
         _draw_calibration(calibration, visited)
         _draw_before_crashes(before, visited)
         _draw_distances(distance, visited)
-        if len(claims) > 1:
+        if len(checks) > 1:
             handles, labels = calibration.get_legend_handles_labels()
-            drawing.legend(handles, labels, loc="outside lower center", ncols=len(claims))
+            drawing.legend(handles, labels, loc="outside lower center", ncols=len(checks))
     return drawing
 
 
-def _draw_calibration(axes: Axes, claims: Sequence[tuple[str, pl.DataFrame]]) -> None:
-    for place, (name, rows) in enumerate(claims):
+def _draw_calibration(axes: Axes, checks: Sequence[tuple[str, pl.DataFrame]]) -> None:
+    for place, (name, rows) in enumerate(checks):
         picked = rows.filter("at_random")
         edges = _even_edges(picked["value"].to_numpy())
         _draw(axes, place, name, bias_by(picked, "value", edges), "value", "achieved")
     low, high = axes.get_xlim()
     axes.axline((low, low), slope=1, color="#7a7a7a", linewidth=1, linestyle="--")
     axes.set(
-        xlabel="claimed: Q(s, a)", ylabel="achieved discounted return", title="Calibration",
+        xlabel="predicted: Q(s, a)", ylabel="achieved discounted return", title="Calibration",
         xlim=(low, high),
     )  # fmt: skip
 
 
-def _draw_before_crashes(axes: Axes, claims: Sequence[tuple[str, pl.DataFrame]]) -> None:
+def _draw_before_crashes(axes: Axes, checks: Sequence[tuple[str, pl.DataFrame]]) -> None:
     steps = np.array(BEFORE_CRASH)
-    for place, (name, rows) in enumerate(claims):
+    for place, (name, rows) in enumerate(checks):
         table = [bias_by(rows, "before_crash", (step, step + 1)) for step in steps]
         found = [part for part in table if not part.is_empty()]
         if found:
@@ -63,8 +63,8 @@ def _draw_before_crashes(axes: Axes, claims: Sequence[tuple[str, pl.DataFrame]])
     axes.invert_xaxis()
 
 
-def _draw_distances(axes: Axes, claims: Sequence[tuple[str, pl.DataFrame]]) -> None:
-    for place, (name, rows) in enumerate(claims):
+def _draw_distances(axes: Axes, checks: Sequence[tuple[str, pl.DataFrame]]) -> None:
+    for place, (name, rows) in enumerate(checks):
         picked = rows.filter("at_random")
         table = bias_by(picked, "distance", _even_edges(picked["distance"].to_numpy()))
         middle = table.with_columns(middle=(pl.col("low") + pl.col("high")) / 2)
@@ -74,7 +74,7 @@ def _draw_distances(axes: Axes, claims: Sequence[tuple[str, pl.DataFrame]]) -> N
 
 def _draw_bias_axes(axes: Axes, xlabel: str, title: str) -> None:
     axes.axhline(0, color="#7a7a7a", linewidth=1, linestyle="--")
-    axes.set(xlabel=xlabel, ylabel="claimed minus achieved", title=title)
+    axes.set(xlabel=xlabel, ylabel="predicted minus achieved", title=title)
 
 
 def _draw(axes: Axes, place: int, name: str, table: pl.DataFrame, x: str, y: str) -> None:

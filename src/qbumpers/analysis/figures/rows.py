@@ -12,7 +12,7 @@ from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable
 MOST_ROWS = 60
 """More conditions than these are too many for a figure."""
 
-_PANELS = {"assisted": "with the assistant", "unassisted": "without it"}
+_PANELS = ("assisted", "unassisted")
 _QUANTILES = {"low": 0.05, "quarter": 0.25, "median": 0.5, "three_quarters": 0.75, "high": 0.95}
 _MOST_DOTS = 100  # of a condition; more trials only make a smear
 
@@ -25,7 +25,7 @@ def spreads(trials: pl.DataFrame, conditions: Sequence[str]) -> pl.DataFrame:
         conditions: which ones.
 
     Returns:
-        A row a condition and measure: measure, condition, and quantiles: low (5%), quarter,
+        A row per condition and measure: measure, condition, and quantiles: low (5%), quarter,
         median, three_quarters, high (95%).
     """
     chosen = trials.filter(pl.col("condition").is_in(list(conditions)))
@@ -39,7 +39,7 @@ def spreads(trials: pl.DataFrame, conditions: Sequence[str]) -> pl.DataFrame:
 
 
 def spreads_figure(spread: pl.DataFrame, trials: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
-    """Distribution over trials of their mean returns, a row a condition.
+    """Distribution over trials of their mean returns, a row per condition.
 
     Args:
         spread: from `spreads`.
@@ -53,20 +53,20 @@ def spreads_figure(spread: pl.DataFrame, trials: pl.DataFrame, drawn: Mapping[st
     conditions = spread["condition"].unique(maintain_order=True).to_list()
     with figure(10, 1 + 0.21 * len(conditions)) as drawing:
         panels = drawing.subplots(1, len(_PANELS), sharey=True)
-        for axes, (measure, title) in zip(panels, _PANELS.items(), strict=True):
+        for axes, measure in zip(panels, _PANELS, strict=True):
             _draw_dots(axes, trials, conditions, measure, drawn)
             rows = spread.filter(measure=measure)
             places = rows.select("low", "quarter", "median", "three_quarters", "high")
             _draw_rows(axes, conditions, places.cast(pl.Float64).to_numpy(), drawn)
-            axes.set(xlabel=f"mean return of a trial {title}")
+            axes.set(xlabel=f"mean {measure} return of a trial")
     return drawing
 
 
 def differences_figure(differences: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
-    """How mean returns differ from a control's, a row a condition.
+    """How mean returns differ from a control's, a row per condition.
 
     Args:
-        differences: a row a measure and condition: measure, condition, `difference_mean`, `_low`,
+        differences: a row per measure and condition: measure, condition, `difference_mean`, `_low`,
             `_high`, simultaneous_low, simultaneous_high.
         drawn: looks of the assistants.
 
@@ -76,13 +76,13 @@ def differences_figure(differences: pl.DataFrame, drawn: Mapping[str, Look]) -> 
     conditions = differences["condition"].unique(maintain_order=True).to_list()
     with figure(10, 1 + 0.21 * len(conditions)) as drawing:
         panels = drawing.subplots(1, len(_PANELS), sharey=True)
-        for axes, (measure, title) in zip(panels, _PANELS.items(), strict=True):
+        for axes, measure in zip(panels, _PANELS, strict=True):
             rows = differences.filter(measure=measure)
             ends = ("simultaneous_low", "difference_low", "difference_mean", "difference_high",
                     "simultaneous_high")  # fmt: skip
             axes.axvline(0, color="#555555", linewidth=1)
             _draw_rows(axes, conditions, rows.select(ends).cast(pl.Float64).to_numpy(), drawn)
-            axes.set(xlabel=f"difference of mean returns {title}")
+            axes.set(xlabel=f"difference of mean {measure} returns")
     return drawing
 
 

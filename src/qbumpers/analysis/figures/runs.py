@@ -12,7 +12,7 @@ from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable
 from qbumpers.analysis.measures import trial_samples
 from qbumpers.analysis.statistics import mean_interval
 
-_PANELS = {"assisted": "mean return with the assistant", "unassisted": "mean return without it"}
+_PANELS = {"assisted": "mean assisted return", "unassisted": "mean unassisted return"}
 _MEASURES = (*_PANELS, "assisted_success", "unassisted_success")
 _FILLS = ("full", "none", "left", "bottom")
 _SPREAD = 0.7  # of the height of a run, over which its conditions are drawn
@@ -22,12 +22,12 @@ def run_means(trials: pl.DataFrame) -> pl.DataFrame:
     """Mean returns and success rates of every condition of several runs.
 
     Args:
-        trials: a row a run and trial: run, and the columns of `trial_measures`.
+        trials: a row per run and trial: run, and the columns of `trial_measures`.
 
     Returns:
-        A row a run and condition, those in the same order in every run: run, condition, trials,
+        A row per run and condition, those in the same order in every run: run, condition, trials,
         and `_mean`, `_low` and `_high` of `assisted`, `unassisted`, `assisted_success`,
-        `unassisted_success`: 95% intervals over trials, null where unknown.
+        `unassisted_success`: 95% intervals over trials, null if unknown.
     """
     rows = []
     for run in trials["run"].unique(maintain_order=True):
@@ -45,7 +45,7 @@ def _row(run: str, condition: str, values: np.ndarray) -> dict[str, Any]:
 
 
 def runs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
-    """Returns with the assistant and without it, a row a run.
+    """Assisted and unassisted returns, a row per run.
 
     Args:
         numbers: from `run_means`.

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from qbumpers.analysis.figures.style import DASHES, NAMES, Look, figure
 
 _PANELS = {
-    "assisted": "return with the assistant",
-    "unassisted": "return without it",
+    "assisted": "assisted return",
+    "unassisted": "unassisted return",
     "override_rate": "steps overridden, per cent",
 }
 _PARTS = ("mean", "low", "high")
@@ -26,9 +26,9 @@ def sensitivities(summary: pl.DataFrame, options: Sequence[str]) -> pl.DataFrame
         options: its columns that are options of assistants.
 
     Returns:
-        A row an option and condition: assistant, option, value, others (the other swept options,
+        A row per option and condition: assistant, option, value, others (the other swept options,
         as text), condition, and mean, low and high of `assisted`, `unassisted`, `override_rate`;
-        no rows where nothing is swept.
+        no rows if nothing is swept.
     """
     parts = []
     numeric = [name for name in options if summary.schema[name].is_numeric()]
@@ -80,7 +80,7 @@ def sensitivity_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figu
 
 
 def _place(axes: Axes, values: np.ndarray) -> dict[float, float]:
-    """Where values stand: evenly spaced where some lie too close together to be told apart."""
+    """Places of values on the axis: evenly spaced if some are too close to be distinguished."""
     if np.diff(values).min() >= np.ptp(values) / 40:
         return {value: value for value in values.tolist()}
     step = max(1, len(values) // 14)

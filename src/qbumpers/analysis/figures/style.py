@@ -92,7 +92,7 @@ def assistant_of(condition: str) -> str:
 
 
 def readable(condition: str) -> str:
-    """A condition's id as figures call it, for instance "Stochastic Q Bumpers, α = 0.7".
+    """A condition's id as figures call it, for example "Stochastic Q Bumpers, α = 0.7".
 
     The learner after "@" is left out: every figure is of one learner.
     """
@@ -102,19 +102,19 @@ def readable(condition: str) -> str:
 
 
 def setting(condition: str) -> str:
-    """The options in a condition's id as figures write them, for instance "α = 0.7"."""
+    """The options in a condition's id as figures write them, for example "α = 0.7"."""
     options = condition.partition("@")[0].partition("/")[2]
     return options.replace("alpha=", "α = ").replace(",", ", ")
 
 
-_FAR = 1000  # beyond it what lies near zero could not be told apart
+_FAR = 1000  # beyond it what lies near zero could not be distinguished
 
 
 def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
     """Show returns of very different size: linear within -100..100, logarithmic beyond.
 
     Args:
-        axes: with everything drawn; left as they are where all returns are small.
+        axes: with everything drawn; left as they are if all returns are small.
         axis: which one.
     """
     along, set_scale = (

@@ -1,4 +1,4 @@
-"""Returns, successes and crashes, without the assistant against with it: Figure 4 of the paper."""
+"""Unassisted returns, successes and crashes against assisted ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -33,8 +33,8 @@ def tradeoffs(summary: pl.DataFrame) -> pl.DataFrame:
         summary: rows of `summary.csv`, of one learner.
 
     Returns:
-        A row a condition, those of each assistant by growing alpha: condition, assistant, alpha,
-        and mean, low and high of the measures of `PANELS` that are known; no rows where that are
+        A row per condition, those of each assistant by growing alpha: condition, assistant, alpha,
+        and mean, low and high of the measures of `PANELS` that are known; no rows if those are
         the returns alone.
     """
     known = [m for pair in PANELS for m in pair if f"{m}_mean" in summary.columns]
@@ -48,7 +48,7 @@ def tradeoffs(summary: pl.DataFrame) -> pl.DataFrame:
 
 
 def tradeoffs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
-    """A panel a measure: without the assistant upwards, with it to the right.
+    """A panel per measure: unassisted upwards, assisted to the right.
 
     Args:
         numbers: from `tradeoffs`.
@@ -70,7 +70,7 @@ def tradeoffs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure
                 stretch(axes, "y")
             else:
                 _within(axes)
-            axes.set(title=title, xlabel="with the assistant", ylabel="without it")
+            axes.set(title=title, xlabel="assisted", ylabel="unassisted")
             _label(axes, rows, pair, drawn)
         handles, labels = panels[0].get_legend_handles_labels()
         numbered = any(axes.texts for axes in panels)
@@ -90,7 +90,7 @@ def _within(axes: Axes) -> None:
 def _label(
     axes: Axes, rows: pl.DataFrame, pair: tuple[str, str], drawn: Mapping[str, Look]
 ) -> None:
-    """The alpha of a few points of each method, where there is room."""
+    """The alpha of a few points of each method, if there is room."""
     axes.autoscale_view()  # now, since places in inches depend on the limits
     places = rows.select(f"{measure}_mean" for measure in pair).to_numpy()
     inches = axes.transAxes.inverted().transform(axes.transData.transform(places)) * _PANEL_SIZE
@@ -113,7 +113,7 @@ def labelled(assistants: Sequence[str], alphas: Sequence[float | None]) -> list[
 
     Args:
         assistants: of the conditions.
-        alphas: of the conditions; None where the assistant has none.
+        alphas: of the conditions; None if the assistant has none.
 
     Returns:
         Places of at most `MOST_LABELS` conditions of each assistant that has several: the ends of

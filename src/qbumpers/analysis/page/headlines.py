@@ -6,11 +6,10 @@ from typing import Any
 
 import polars as pl
 
-from qbumpers.analysis.claims import Claim
 from qbumpers.analysis.figures.style import NAMES, readable, setting
 from qbumpers.analysis.findings import Findings, LearnerFindings
+from qbumpers.analysis.formatting import decimals_for, format_number, format_share
 from qbumpers.analysis.frontier import Regret
-from qbumpers.analysis.numerals import digits_for, per_cent, written
 from qbumpers.experiments.design import Experiment
 
 FEW_TRIALS = 20
@@ -24,10 +23,10 @@ def headlines(findings: Findings) -> list[str]:
         findings: the tables.
 
     Returns:
-        Sentences; those on one of several learners begin with what tells it from the others.
+        Sentences; those on one of several learners begin with what distinguishes it.
     """
     return [
-        *(f"The paper's claim that {told(claim)}" for claim in findings.claims),
+        *findings.additions.headlines,
         *(
             f"With {about.label}: {sentence}" if about.label else sentence
             for about in findings.learners
@@ -36,34 +35,21 @@ def headlines(findings: Findings) -> list[str]:
     ]
 
 
-def told(claim: Claim) -> str:
-    """A claim and what came of it; of one about settings, how many speak for it and against it."""
-    verdicts = list(claim.settings.values())
-    if not claim.about_settings:
-        return f"{claim.title}: {claim.verdict}."
-    counts = (
-        f"of {len(verdicts)} setting{'s' * (len(verdicts) != 1)} tried, "
-        f"{verdicts.count(True)} for it, "
-        f"{verdicts.count(False)} against it"
-    )
-    return f"{claim.title}: {claim.verdict} ({counts})."
-
-
 def _about(about: LearnerFindings) -> Iterator[str]:
     for matched, regret in about.regrets.items():
         yield _regret(matched, regret, *(about.compared or ("", "")))
     if about.methods.height > 1 and about.summary["trials"].to_numpy().min() > 1:
         yield from _largest(about.methods)
     for part in about.summary.partition_by("assistant", maintain_order=True):
-        yield _best_settings(_helping(part))
+        yield _best_settings(_overriding(part))
     if about.control and about.differences["simultaneous_low"].null_count() == 0:
         yield _against_control(about.differences)
 
 
-def _helping(rows: pl.DataFrame) -> pl.DataFrame:
-    """Settings that override at all; every one where none does."""
-    helping = rows.filter(pl.col("overrides_mean") > 0)
-    return helping if helping.height else rows
+def _overriding(rows: pl.DataFrame) -> pl.DataFrame:
+    """Settings that override at all; every one if none does."""
+    overriding = rows.filter(pl.col("overrides_mean") > 0)
+    return overriding if overriding.height else rows
 
 
 def _name(assistant: str) -> str:
@@ -74,15 +60,15 @@ def _largest(methods: pl.DataFrame) -> Iterator[str]:
     """Which method covers most, as a share of what all conditions cover together."""
     best = methods.sort("hypervolume_mean", descending=True).row(0, named=True)
     if best["share"]:
-        name, largest = _name(best["assistant"]), per_cent(best["largest"])
+        name, largest = _name(best["assistant"]), format_share(best["largest"])
         yield (
-            f"{name} covers {per_cent(best['share'])} of the performance and learning that all "
+            f"{name} covers {format_share(best['share'])} of the performance and learning that all "
             f"conditions cover together, the most of all methods (in {largest} of the resamples)."
         )
 
 
 def _best_settings(rows: pl.DataFrame) -> str:
-    """Where an assistant teaches best, and where it performs best."""
+    """At which settings an assistant teaches best and performs best."""
     name = _name(str(rows["assistant"][0]))
     learning = rows.sort("unassisted_mean", descending=True).row(0, named=True)
     performing = rows.sort("assisted_mean", descending=True).row(0, named=True)
@@ -101,16 +87,16 @@ def _returns(row: Mapping[str, Any]) -> str:
     assisted, unassisted = (_interval(row, measure) for measure in ("assisted", "unassisted"))
     if row["assistant"] == "none":
         return f"{assisted} in training and {unassisted} in greedy episodes"
-    return f"{assisted} with it, {unassisted} without it"
+    return f"{assisted} assisted, {unassisted} unassisted"
 
 
 def _interval(row: Mapping[str, Any], measure: str) -> str:
     """A mean return and half the width of its interval."""
     mean, low, high = (row[f"{measure}_{part}"] for part in ("mean", "low", "high"))
-    digits = digits_for(low, high)
+    digits = decimals_for(low, high)
     if low is None:
-        return written(mean, digits)
-    return f"{written(mean, digits)} ± {written((high - low) / 2, digits)}"
+        return format_number(mean, digits)
+    return f"{format_number(mean, digits)} ± {format_number((high - low) / 2, digits)}"
 
 
 def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
@@ -124,7 +110,7 @@ def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
     amount = f"{abs(100 * reduction.mean):.0f}% {'less' if reduction.mean >= 0 else 'more'}"
     interval = "its interval is not known"
     if not isnan(reduction.low):
-        ends = f"{per_cent(reduction.low)} to {per_cent(reduction.high)}"
+        ends = f"{format_share(reduction.low)} to {format_share(reduction.high)}"
         interval = f"95% interval of the reduction {ends}"
     return (
         f"At matched {matched}, {ours} has {amount} regret in {compared} than {theirs} "
@@ -133,7 +119,7 @@ def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
 
 
 def _against_control(differences: pl.DataFrame) -> str:
-    """How many settings surely differ from no assistance."""
+    """How many settings differ significantly from no assistance."""
     counts = {
         (measure, sign): rows.filter(end).height
         for (measure,), rows in differences.partition_by("measure", as_dict=True).items()
@@ -146,8 +132,8 @@ def _against_control(differences: pl.DataFrame) -> str:
     plural = "s" * (total != 1)
     return (
         f"Against no assistance, of {total} condition{plural} {counts['assisted', 'better']} "
-        f"surely perform better and {counts['assisted', 'worse']} worse, "
-        f"{counts['unassisted', 'better']} surely teach better and "
+        f"perform significantly better and {counts['assisted', 'worse']} worse, "
+        f"{counts['unassisted', 'better']} teach significantly better and "
         f"{counts['unassisted', 'worse']} worse (95% for all at once)."
     )
 
@@ -160,30 +146,21 @@ def cautions(findings: Findings, experiment: Experiment) -> list[str]:
         experiment: as run.
 
     Returns:
-        Sentences; empty where there is nothing to warn of.
+        Sentences; empty if there is nothing to warn of.
     """
-    return [*_of_size(experiment), *_of_paper(findings), *_of_ties(findings)]
+    return [*_of_size(experiment), *findings.additions.cautions, *_of_ties(findings)]
 
 
 def _of_size(experiment: Experiment) -> Iterator[str]:
     if experiment.trials == 1:
-        yield "There is one trial a condition: nothing here has an interval."
+        yield "There is one trial per condition: nothing here has an interval."
     elif experiment.trials < FEW_TRIALS:
         yield (
-            f"There are only {experiment.trials} trials a condition: intervals are wide, and those "
-            f"from resampling tend to be too narrow below {FEW_TRIALS} trials."
+            f"There are only {experiment.trials} trials per condition: intervals are wide, and "
+            f"those from resampling tend to be too narrow below {FEW_TRIALS} trials."
         )
     if experiment.episodes == 1:
-        yield "There is one episode a trial: nobody had the time to learn."
-
-
-def _of_paper(findings: Findings) -> Iterator[str]:
-    unlike = [row for row in findings.comparisons if row.agrees is False]
-    if unlike:
-        yield (
-            f"{len(unlike)} of {len(findings.comparisons)} numbers that the paper prints disagree "
-            "with the measured ones."
-        )
+        yield "There is one episode per trial: no learner had the time to learn."
 
 
 def _of_ties(findings: Findings) -> Iterator[str]:
@@ -191,14 +168,14 @@ def _of_ties(findings: Findings) -> Iterator[str]:
     close = [text for about in findings.learners for text in _close_settings(about)]
     if close:
         yield (
-            "Which setting teaches best is not sure: intervals overlap with the best one's for "
-            f"{'; '.join(close)}. The best of several noisy means flatters itself."
+            "Which setting teaches best is uncertain: intervals overlap with the best one's for "
+            f"{'; '.join(close)}. The best of several noisy means looks better than it is."
         )
 
 
 def _close_settings(about: LearnerFindings) -> Iterator[str]:
     for part in about.summary.partition_by("assistant", maintain_order=True):
-        settings = _helping(part)
+        settings = _overriding(part)
         best = settings.sort("unassisted_mean", descending=True).row(0, named=True)
         if best["unassisted_low"] is None:
             continue

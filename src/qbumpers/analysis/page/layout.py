@@ -11,12 +11,8 @@ from markupsafe import Markup
 
 from qbumpers.analysis.figures.style import NAMES
 from qbumpers.analysis.findings import Findings
-from qbumpers.analysis.numerals import written
+from qbumpers.analysis.formatting import format_number
 from qbumpers.analysis.page import tables as page_tables
-from qbumpers.analysis.page.evidence import claim_table
-from qbumpers.analysis.section_4_1 import ThresholdStory
-from qbumpers.experiments.design import Experiment, reproductions
-from qbumpers.experiments.sources import profiles, reproduction
 from qbumpers.experiments.store import EXPERIMENT, Results, run_description
 
 
@@ -24,12 +20,12 @@ class Picture(NamedTuple):
     """A drawn figure.
 
     Attributes:
-        kind: what it is, for instance "frontier".
-        label: what tells its learner from others.
-        name: of its files, without ending.
+        kind: what it is, for example "frontier".
+        label: what distinguishes its learner from others.
+        name: the name of its files, without ending.
         caption: what can be seen.
         image: content of the PNG.
-        numbers: behind it, as CSV.
+        numbers: what it is drawn from, as CSV.
     """
 
     kind: str
@@ -44,7 +40,6 @@ def page(
     folder: Path,
     results: Results,
     findings: Findings,
-    story: ThresholdStory | None,
     pictures: Sequence[Picture],
     tables: Mapping[str, pl.DataFrame],
 ) -> str:
@@ -54,7 +49,6 @@ def page(
         folder: of the run.
         results: of the run.
         findings: what its tables say.
-        story: the numbers of Section 4.1, where the run tells that story.
         pictures: every figure.
         tables: CSV files, offered for download.
 
@@ -66,9 +60,7 @@ def page(
     return _template().render(
         experiment=results.experiment,
         findings=findings,
-        story=story,
         make=page_tables,
-        claim_table=claim_table,
         names=NAMES,
         kinds={picture.kind for picture in pictures},
         pictures=pictures,
@@ -76,7 +68,7 @@ def page(
         files={**files, EXPERIMENT: _data("application/toml", settings.encode())},
         settings=settings,
         run=run_description(folder),
-        command=command(results.experiment),
+        command=findings.additions.command or f"qbumpers run {EXPERIMENT}",
     )
 
 
@@ -88,22 +80,11 @@ def _template() -> jinja2.Template:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"number": written}
+    environment.filters |= {"number": format_number}
     return environment.get_template("report.html.j2")
 
 
-def command(experiment: Experiment) -> str:
-    """What to type to repeat an experiment."""
-    known = [(name, profile) for name in reproductions() for profile in profiles(name)]
-    for name, profile in known:
-        repeated = reproduction(name, profile, trials=experiment.trials, seed=experiment.seed)
-        if repeated == experiment:
-            size = f"--trials {experiment.trials} --seed {experiment.seed}"
-            return f"qbumpers reproduce {name} --profile {profile} {size}"
-    return f"qbumpers run {EXPERIMENT}"
-
-
 def _data(kind: str, content: bytes | str) -> Markup:
-    """Content as an address that holds it."""
+    """Content as a data URL."""
     content = content.encode() if isinstance(content, str) else content
     return Markup(f"data:{kind};base64,{base64.b64encode(content).decode()}")

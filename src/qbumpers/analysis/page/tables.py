@@ -6,13 +6,12 @@ from typing import Any
 import polars as pl
 from markupsafe import Markup
 
+from qbumpers.analysis.comparisons import RETURNS
 from qbumpers.analysis.figures.style import NAMES
 from qbumpers.analysis.findings import LearnerFindings
+from qbumpers.analysis.formatting import NONE, format_number, format_share
 from qbumpers.analysis.measures import MEASURES
-from qbumpers.analysis.numerals import NONE, per_cent, written
-from qbumpers.analysis.page.cells import Column, Table, breakable, interval, named, share
-from qbumpers.analysis.published import Comparison
-from qbumpers.analysis.section_4_1 import ThresholdStory
+from qbumpers.analysis.page.elements import Column, Table, breakable, interval, share, unbroken
 
 
 def _of(row: Mapping[str, Any], measure: str, least: int = 1) -> Markup:
@@ -24,17 +23,17 @@ def pareto_table(about: LearnerFindings) -> Table:
     """The Pareto-optimal conditions, and others that might be; best performance first."""
     columns = [
         Column("condition", text=True),
-        Column("return with the assistant"),
-        Column("return without it"),
+        Column("assisted return"),
+        Column("unassisted return"),
         Column("probability Pareto-optimal"),
     ]
     chosen = about.frontier.filter(pl.col("pareto") | (pl.col("probability") >= 0.05))
     rows = [
         [
-            named(row["condition"]) + ("" if row["pareto"] else " (beaten here)"),
+            unbroken(row["condition"]) + ("" if row["pareto"] else " (beaten here)"),
             _of(row, "assisted"),
             _of(row, "unassisted"),
-            per_cent(row["probability"]),
+            format_share(row["probability"]),
         ]
         for row in chosen.sort("assisted_mean", descending=True).iter_rows(named=True)
     ]
@@ -42,12 +41,12 @@ def pareto_table(about: LearnerFindings) -> Table:
 
 
 def methods_table(about: LearnerFindings) -> Table:
-    """Whole methods."""
+    """Whole methods: their mean returns, and what their settings cover."""
     columns = [
         Column("method", text=True),
         Column("settings"),
-        Column("mean return with it"),
-        Column("mean return without it"),
+        Column("mean assisted return"),
+        Column("mean unassisted return"),
         Column("covers of all"),
         Column("hypervolume"),
         Column("covers most"),
@@ -58,9 +57,9 @@ def methods_table(about: LearnerFindings) -> Table:
             str(row["conditions"]),
             _of(row, "assisted_macro"),
             _of(row, "unassisted_macro"),
-            per_cent(row["share"]),
+            format_share(row["share"]),
             _of(row, "hypervolume", 0),
-            per_cent(row["largest"]),
+            format_share(row["largest"]),
         ]
         for row in about.methods.iter_rows(named=True)
     ]
@@ -68,7 +67,7 @@ def methods_table(about: LearnerFindings) -> Table:
 
 
 def advantage_table(about: LearnerFindings) -> Table:
-    """Every two methods against each other."""
+    """Every two methods by what their settings cover."""
     columns = [
         Column("method", text=True),
         Column("against", text=True),
@@ -79,7 +78,7 @@ def advantage_table(about: LearnerFindings) -> Table:
         [
             *(NAMES.get(row[who], row[who]) for who in ("assistant", "other")),
             _of(row, "advantage", 0),
-            per_cent(row["probability"]),
+            format_share(row["probability"]),
         ]
         for row in about.advantages.iter_rows(named=True)
     ]
@@ -87,7 +86,7 @@ def advantage_table(about: LearnerFindings) -> Table:
 
 
 def regret_table(about: LearnerFindings) -> Table:
-    """The method against the baseline."""
+    """How much less the method loses than the baseline, by what is matched."""
     columns = [
         Column("matched", text=True),
         Column("reduction of regret"),
@@ -101,42 +100,15 @@ def regret_table(about: LearnerFindings) -> Table:
         [
             matched,
             share(*regret.reduction),
-            named(regret.baseline_condition),
-            written(regret.level),
-            written(regret.baseline),
+            unbroken(regret.baseline_condition),
+            format_number(regret.level),
+            format_number(regret.baseline),
             interval(*regret.method),
-            written(regret.best),
+            format_number(regret.best),
         ]
         for matched, regret in about.regrets.items()
     ]
     return Table(columns, rows, "regret.csv", cards=True)
-
-
-def published_table(comparisons: Sequence[Comparison]) -> Table:
-    """Printed numbers beside measured ones."""
-    columns = [
-        Column("number", text=True),
-        Column("paper"),
-        Column("measured, with 95% interval"),
-        Column("agrees", text=True),
-        Column("", text=True, secondary=True),
-    ]
-    verdicts = {
-        None: NONE,
-        True: Markup('<span class="yes">yes</span>'),
-        False: Markup('<span class="no">no</span>'),
-    }
-    rows = [
-        [
-            row.what,
-            row.printed,
-            interval(*row.measured, 2 if "regret" in row.what else 1),
-            verdicts[row.agrees],
-            row.note,
-        ]
-        for row in comparisons
-    ]
-    return Table(columns, rows, "published.csv", cards=True)
 
 
 def differences_table(about: LearnerFindings) -> Table:
@@ -144,19 +116,19 @@ def differences_table(about: LearnerFindings) -> Table:
     columns = [
         Column("condition", text=True),
         *(
-            Column(f"{what} {side}", secondary=what != "difference")
-            for side in ("with it", "without it")
+            Column(f"{side}: {what}", secondary=what != "difference")
+            for side in RETURNS
             for what in ("difference", "p (Holm)", "probability of improvement")
         ),
     ]
     found: dict[str, list[str]] = {}
     for row in about.differences.iter_rows(named=True):
-        cells = found.setdefault(row["condition"], [named(row["condition"])])
+        cells = found.setdefault(row["condition"], [unbroken(row["condition"])])
         numbers = (row["difference_mean"], row["simultaneous_low"], row["simultaneous_high"])
         cells += [
             interval(*numbers),
             _p_value(row["p_adjusted"]),
-            per_cent(row["improvement_mean"]),
+            format_share(row["improvement_mean"]),
         ]
     return Table(columns, list(found.values()), "differences.csv")
 
@@ -170,15 +142,15 @@ def _p_value(value: float | None) -> str:
 _DEPENDENCE = {
     "dependence": "dependence",
     "dependence_last": "dependence at the end",
-    "unassisted_last": "return without it at the end",
+    "unassisted_last": "unassisted return at the end",
     "retention": "retention",
     "criterion_episodes": "episodes to the criterion",
-    "criterion_reached": "reach it",
+    "criterion_reached": "reach the criterion",
 }
 
 
 def dependence_table(about: LearnerFindings) -> Table:
-    """How much learners depend on each assistant, and what they keep; what is known of it."""
+    """How much learners depend on each assistant, and what they retain; what is known of it."""
     known = _known(about.summary, _DEPENDENCE)
     columns = [
         Column("condition", text=True),
@@ -186,9 +158,9 @@ def dependence_table(about: LearnerFindings) -> Table:
     ]
     rows = [
         [
-            named(row["condition"]),
+            unbroken(row["condition"]),
             *(
-                per_cent(row[f"{name}_mean"]) if name == "criterion_reached" else _of(row, name)
+                format_share(row[f"{name}_mean"]) if name == "criterion_reached" else _of(row, name)
                 for name in known
             ),
         ]
@@ -198,10 +170,12 @@ def dependence_table(about: LearnerFindings) -> Table:
 
 
 def learners_table(learners: Sequence[LearnerFindings], measure: str) -> Table:
-    """One measure of every condition, a column a learner."""
+    """One measure of every condition, a column per learner."""
     columns = [Column("condition", text=True), *(Column(about.label) for about in learners)]
     everyone = zip(*(about.summary.iter_rows(named=True) for about in learners), strict=True)
-    rows = [[named(row[0]["condition"]), *(_of(one, measure) for one in row)] for row in everyone]
+    rows = [
+        [unbroken(row[0]["condition"]), *(_of(one, measure) for one in row)] for row in everyone
+    ]
     return Table(columns, rows, cards=True)
 
 
@@ -210,20 +184,20 @@ def conditions_table(about: LearnerFindings) -> Table:
     events = _known(about.summary, ("unassisted_success", "unassisted_crash"))
     columns = [
         Column("condition", text=True),
-        Column("return with the assistant"),
-        Column("return without it"),
-        Column("overrides an episode", secondary=True),
+        Column("assisted return"),
+        Column("unassisted return"),
+        Column("overrides per episode", secondary=True),
         Column("overridden steps", secondary=True),
-        *(Column(f"{name.partition('_')[2]} without it", secondary=True) for name in events),
+        *(Column(name.replace("_", " "), secondary=True) for name in events),
     ]
     rows = [
         [
             breakable(row["condition"]),
             _of(row, "assisted"),
             _of(row, "unassisted"),
-            written(row["overrides_mean"], 2),
-            per_cent(row["override_rate_mean"]),
-            *(per_cent(row[f"{name}_mean"]) for name in events),
+            format_number(row["overrides_mean"], 2),
+            format_share(row["override_rate_mean"]),
+            *(format_share(row[f"{name}_mean"]) for name in events),
         ]
         for row in about.summary.iter_rows(named=True)
     ]
@@ -240,30 +214,8 @@ def measures_table(summary: pl.DataFrame) -> Table:
     return Table(columns, [[name, MEASURES[name]] for name in _known(summary, MEASURES)])
 
 
-def thresholds_table(story: ThresholdStory) -> Table:
-    """The moves that Section 4.1 discusses."""
-    columns = [
-        Column("cell", text=True),
-        Column("move", text=True),
-        Column("Q*"),
-        Column("best Q* there"),
-        Column("overridden where α is below"),
-    ]
-    rows = [
-        [
-            f"({row},\N{NO-BREAK SPACE}{column})",
-            action,
-            written(value, 0),
-            written(best, 0),
-            written(critical, 4),
-        ]
-        for row, column, action, value, best, critical in story.examples
-    ]
-    return Table(columns, rows)
-
-
 def versions_table(run: Mapping[str, Any]) -> Table:
-    """What made the results."""
+    """The versions and the platform that made the results."""
     names = {"version": "qbumpers", "python": "Python"}
     rows = [[names.get(name, name), str(value)] for name, value in run.items()]
     return Table([Column("", text=True), Column("version", text=True)], rows)

@@ -1,0 +1,92 @@
+"""Training several experts by the paper's recipe, and keeping the best of them in a file."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from qbumpers.errors import checked
+from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
+from qbumpers.experts.training import Recipe
+from qbumpers.tasks.vector import VectorTask
+from qbumpers.values.network import NetworkValues
+
+
+class Selection(NamedTuple):
+    """Experts trained alike, and the best of them.
+
+    Attributes:
+        seeds: N of them, one per expert.
+        judgements: N of them.
+        best: place of the expert that is kept, from 0.
+        values: of that expert, with how it was chosen in their provenance.
+        folder: where all of them are.
+    """
+
+    seeds: Sequence[int]
+    judgements: Sequence[Judgement]
+    best: int
+    values: NetworkValues
+    folder: Path
+
+
+def make_recipe(
+    task: VectorTask,
+    *,
+    steps: int,
+    hidden: Sequence[int],
+    activation: str,
+    learning_rate: float,
+    random_start: int,
+) -> Recipe:
+    """The paper's recipe at the discount of a task, with some of its settings changed.
+
+    Args:
+        task: to be learned.
+        steps: of training.
+        hidden: units of each hidden layer.
+        activation: of hidden units, "tanh" or "relu".
+        learning_rate: of Adam.
+        random_start: random actions before each episode of training.
+
+    Raises:
+        RequestError: naming each setting that is out of range.
+    """
+    usual = Recipe().learner
+    learner = {
+        **usual._asdict(),
+        "network": {"hidden": tuple(hidden), "activation": activation},
+        "learning_rate": learning_rate,
+        "discount": task.discount,
+    }
+    return Recipe(checked(type(usual), learner, "expert"), steps, random_start)
+
+
+def train_best(
+    task: VectorTask,
+    recipe: Recipe,
+    seeds: Sequence[int],
+    path: Path,
+    report: Callable[[int, int], None] = lambda seed, steps: None,
+) -> Selection:
+    """Train an expert with each seed, and keep the best in a file.
+
+    Finished experts are in a folder beside the file, and are not trained again.
+
+    Args:
+        task: the task.
+        recipe: of all of them.
+        seeds: of the random numbers, not negative.
+        path: of the file; "PATH.work" is the folder.
+        report: called with a seed and its steps done.
+
+    Raises:
+        RequestError: if training fails or a finished expert is damaged.
+        StoreError: if a file cannot be written.
+    """
+    folder = path.with_name(f"{path.name}.work")
+    trained = train_several(task, recipe, seeds, folder, report)
+    judgements = [judge(task, values) for values in trained]
+    chosen = best(judgements)
+    values = with_provenance(task, trained[chosen], judgements[chosen], seeds)
+    values.save(path)
+    return Selection(seeds, judgements, chosen, values, folder)

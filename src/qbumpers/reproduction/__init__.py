@@ -1,0 +1,1 @@
+"""Published experiments: a folder for each, with its settings, numbers, claims and figures."""

@@ -1,0 +1,26 @@
+"""What the paper adds to a report of Lunar Lander: its claims in words."""
+
+from qbumpers.analysis.additions import Additions
+from qbumpers.analysis.findings import Findings
+from qbumpers.experiments.store import Results
+from qbumpers.reproduction.claims import CLAIMS, claim_sentence, claims_frame, claims_section
+from qbumpers.reproduction.lunar_lander.claims import decisive_conditions, experiment_claims
+
+
+def additions(results: Results, findings: Findings) -> Additions:
+    """The claims with their evidence, and the learning curves that say most about them.
+
+    Args:
+        results: of the run.
+        findings: its tables.
+    """
+    claims = experiment_claims(findings.trials, results.experiment)
+    if not claims:
+        return Additions()
+    note = "The paper prints no numbers for it, so there are none to compare."
+    return Additions(
+        headlines=[f"The paper's claim that {claim_sentence(claim)}" for claim in claims],
+        tables={CLAIMS: claims_frame(claims)},
+        sections=[claims_section(claims, note)],
+        curves=decisive_conditions(findings.trials),
+    )

@@ -1,0 +1,54 @@
+"""Reports of published experiments: those of any experiment, with what their paper adds."""
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+
+from qbumpers.analysis import report
+from qbumpers.analysis.additions import Additions
+from qbumpers.analysis.findings import Findings
+from qbumpers.experiments.store import Results
+from qbumpers.reproduction.claims import CLAIMS
+from qbumpers.reproduction.experiments import command, package_of
+from qbumpers.reproduction.printed import PUBLISHED
+
+
+def additions(results: Results, findings: Findings) -> Additions:
+    """What the paper adds to a report; nothing if the experiment reproduces none.
+
+    Args:
+        results: of the run.
+        findings: its tables.
+    """
+    name = results.experiment.reproduces
+    if name is None:
+        return Additions()
+    paper = importlib.import_module(f"{package_of(name)}.additions")
+    return paper.additions(results, findings)._replace(command=command(results.experiment))
+
+
+def find(results: Results) -> Findings:
+    """Every table of a report and what they say in sentences, from the results of a run."""
+    return report.find(results, additions)
+
+
+def write_report(
+    folder: str | Path, advance: Callable[[str], None] = lambda part: None
+) -> Findings:
+    """Analyse a finished run, published or not: `qbumpers.analysis.report.write_report`.
+
+    Args:
+        folder: of the run.
+        advance: called with the name of each part before it is made.
+
+    Returns:
+        What the tables say.
+
+    Raises:
+        RequestError: if the folder is not one of a finished run.
+        StoreError: if a file cannot be written.
+    """
+    findings = report.write_report(folder, advance, additions)
+    for name in {PUBLISHED, CLAIMS} - findings.additions.tables.keys():
+        (Path(folder) / name).unlink(missing_ok=True)
+    return findings
