@@ -14,7 +14,9 @@ from qbumpers import make_assistant, make_task
 from qbumpers.analysis.figures.style import NAMES, figure, looks, save
 from qbumpers.assistants.stochastic_q_bumpers import override_probability
 from qbumpers.simulation import make_condition, record
-from qbumpers.tasks.cliff_walking import ACTION_NAMES, COLUMNS, as_picture, state_of
+from qbumpers.tasks.cliff_walking import ACTION_NAMES, COLUMNS, state_of
+from qbumpers.tasks.displays.cliff_walking import cliff_walking_display
+from qbumpers.tasks.drawing import picture
 
 DOCS = Path(__file__).parent
 CELL = 64  # pixels of a cell as rendered
@@ -30,10 +32,15 @@ def make(folder: Path) -> None:
     """Draw every picture into `folder`/images."""
     images = folder / "images"
     images.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(as_picture(state_of(2, 6))).save(images / "figure1.png", optimize=True)
+    Image.fromarray(walker_picture()).save(images / "figure1.png", optimize=True)
     keep(credit_picture(), images, "credit")
     keep(probability_picture(), images, "override-probability")
     keep(belief_picture(), images, "belief")
+
+
+def walker_picture() -> np.ndarray:
+    """The walker beside the cliff."""
+    return picture(cliff_walking_display(), state_of(2, 6))
 
 
 def keep(drawing: Figure, images: Path, name: str, colours: int = 128) -> None:
@@ -45,8 +52,8 @@ def keep(drawing: Figure, images: Path, name: str, colours: int = 128) -> None:
 
 def shrink(path: Path, colours: int = 128) -> None:
     """Reduce a PNG to a few colours, a third of its size."""
-    with Image.open(path) as picture:
-        small = picture.convert("RGB").quantize(colours, dither=Image.Dither.NONE)
+    with Image.open(path) as large:
+        small = large.convert("RGB").quantize(colours, dither=Image.Dither.NONE)
     small.save(path, optimize=True)
 
 
@@ -69,8 +76,8 @@ def credit_picture() -> Figure:
 
 def _draw_corner(axes: Axes) -> None:
     """Five columns of the two lower rows, the walker in the middle."""
-    picture = as_picture(state_of(2, 6))[2 * CELL :, 4 * CELL : 9 * CELL]
-    axes.imshow(picture, extent=(0, 5, 2, 0))
+    corner = walker_picture()[2 * CELL :, 4 * CELL : 9 * CELL]
+    axes.imshow(corner, extent=(0, 5, 2, 0))
     axes.set(xticks=[], yticks=[])
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)

@@ -117,10 +117,31 @@ def test_what_is_stated_of_a_table_is_in_its_digest():
     assert whole.digest() == dataclasses.replace(task, action_distance=NEARER).digest()
 
 
-def test_what_is_stated_of_a_vector_task_is_in_its_digest_if_its_settings_mention_it(cart):
-    stated = dataclasses.replace(cart, no_op=1, action_distance=2 * (1 - np.eye(2)))
-    assert stated.digest() == cart.digest()
-    assert dataclasses.replace(stated, settings={"no_op": 1}).digest() != cart.digest()
+def test_what_is_stated_of_a_vector_task_is_in_its_digest(cart):
+    apart = 1 - np.eye(2)
+    stated = [
+        {"no_op": 0},
+        {"no_op": 1},
+        {"action_distance": apart},
+        {"action_distance": 2 * apart},
+        {"no_op": 1, "action_distance": 2 * apart},
+    ]
+    digests = {dataclasses.replace(cart, **each).digest() for each in stated}
+    assert len(digests | {cart.digest()}) == len(stated) + 1
+    listed = dataclasses.replace(cart, action_distance=[[0, 2], [2, 0]])
+    assert listed.digest() in digests
+
+
+def test_what_follows_from_a_tasks_name_is_in_its_digest_only_if_it_is_changed():
+    lander = make_task("lunar-lander")
+    changes = [
+        {"no_op": -1},
+        {"action_distance": None},
+        {"action_distance": 2 * lander.distance},
+    ]
+    digests = {dataclasses.replace(lander, **each).digest() for each in changes}
+    assert len(digests | {lander.digest()}) == len(changes) + 1
+    assert dataclasses.replace(lander, action_distance=lander.distance).digest() == lander.digest()
 
 
 @pytest.mark.parametrize("vectors", [False, True])

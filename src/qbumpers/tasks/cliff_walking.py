@@ -4,17 +4,17 @@ from typing import Any
 
 import numpy as np
 
+from qbumpers.tasks.displays.cliff_walking import ACTIONS, MAP, cliff_walking_display
+from qbumpers.tasks.drawing import picture
 from qbumpers.tasks.environment import TabularEnvironment
 from qbumpers.tasks.tabular import TabularTask
 
 ROWS, COLUMNS = 4, 12
 START, GOAL = (3, 0), (3, 11)
-ACTION_NAMES = ("up", "right", "down", "left")
+ACTION_NAMES = ACTIONS
 EPISODE_LIMIT = 100
 
 _MOVES = np.array([(-1, 0), (0, 1), (1, 0), (0, -1)])
-_CELL = 64  # pixels
-_SMOOTH = 4  # drawn this many times larger, then reduced
 
 
 def state_of(row: int, column: int) -> int:
@@ -78,51 +78,12 @@ class CliffWalking(TabularEnvironment):
         if self.render_mode == "ansi":
             return as_text(self._state)
         if self.render_mode == "rgb_array":
-            return as_picture(self._state)
+            return picture(cliff_walking_display(), self._state)
         return None
 
 
 def as_text(state: int) -> str:
     """The grid as text: S start, C cliff, G goal, o the walker."""
-    cells = np.full((ROWS, COLUMNS), ".")
-    cells[3, 1:11] = "C"
-    cells[START], cells[GOAL] = "S", "G"
+    cells = np.array([list(row) for row in MAP])
     cells.flat[state] = "o"
     return "\n".join(" ".join(row) for row in cells) + "\n"
-
-
-def as_picture(state: int) -> np.ndarray:
-    """The grid as in Figure 1 of the paper: uint8 [256, 768, 3], the walker an orange dot."""
-    from PIL import Image, ImageDraw, ImageFont
-
-    cell = _CELL * _SMOOTH
-    picture = Image.new("RGB", (COLUMNS * cell, ROWS * cell), "#f7f7f4")
-    draw = ImageDraw.Draw(picture)
-    font = ImageFont.load_default(size=cell * 0.45)
-    line = 2 * _SMOOTH
-    for row, column in np.ndindex(ROWS, COLUMNS):
-        left, top = column * cell, row * cell
-        colour, letter, ink = _appearance(row, column)
-        box = (left, top, left + cell - 1, top + cell - 1)
-        draw.rectangle(box, fill=colour, outline="#c9cac4", width=line)
-        draw.text((left + cell / 2, top + cell / 2), letter, fill=ink, font=font, anchor="mm")
-    row, column = divmod(int(state), COLUMNS)
-    radius = cell * 0.27
-    x, y = (column + 0.5) * cell, (row + 0.5) * cell
-    draw.ellipse(
-        (x - radius, y - radius, x + radius, y + radius),
-        fill="#e8890c",
-        outline="#8a4d00",
-        width=line,
-    )
-    return np.asarray(picture.reduce(_SMOOTH))
-
-
-def _appearance(row: int, column: int) -> tuple[str, str, str]:
-    if is_cliff(row, column):
-        return "#4d5359", "C", "#aab0b5"
-    if (row, column) == START:
-        return "#dbe7f3", "S", "#2c5f8f"
-    if (row, column) == GOAL:
-        return "#d9ecd6", "G", "#2f7031"
-    return "#f7f7f4", "", "#000000"

@@ -35,14 +35,14 @@ class VectorTask:
         discount: in (0, 1].
         episode_limit: steps after which an episode is truncated; not a terminal state, learners
             bootstrap through it.
-        settings: JSON-like; all that decides how the environment behaves. What `no_op` and
-            `action_distance` say is part of the digest only if it is mentioned here: it usually
-            follows from the name.
+        settings: JSON-like; all that decides how the environment behaves.
         has_success: whether the environment announces successes.
         has_crash: whether the environment announces crashes.
         undoable: whether its steppers have `snapshot` and `restore`, see `UndoableStepper`.
         no_op: the action that does nothing; -1 if there is none.
         action_distance: float [A, A], how far apart actions are; None if any two are alike.
+        implied: `no_op` and `action_distance` that follow from the name and the settings; any
+            others are part of the digest.
         make_display: makes `display` of the task; no part of its digest.
 
     Raises:
@@ -63,6 +63,7 @@ class VectorTask:
     undoable: bool = False
     no_op: int = -1
     action_distance: np.ndarray | None = None
+    implied: tuple[int, np.ndarray | None] = (-1, None)
     make_display: Callable[["VectorTask"], Any] | None = None
 
     states = 0
@@ -128,8 +129,8 @@ class VectorTask:
         raise RequestError(f"task {self.name} has no table of transitions")
 
     def digest(self) -> str:
-        """A SHA-256 of the name, the settings, the sizes, the discount and the limit."""
-        content = {
+        """A SHA-256 of everything that decides how the task behaves, and what rules do in it."""
+        content: dict[str, Any] = {
             "name": self.name,
             "settings": self.settings,
             "observation_size": self.observation_size,
@@ -137,6 +138,10 @@ class VectorTask:
             "discount": float(self.discount),
             "episode_limit": self.episode_limit,
         }
+        # Digests seed streams: those of tasks that state no more than is implied stay.
+        stated = _plain_facts(self.no_op, self.action_distance)
+        if stated != _plain_facts(*self.implied):
+            content["stated"] = stated
         return content_digest(content).hex()
 
     @classmethod
@@ -185,6 +190,11 @@ class VectorTask:
             has_crash="crash" in announced,
             undoable=undoable,
         )
+
+
+def _plain_facts(no_op: int, distance: np.ndarray | None) -> list[Any]:
+    """What is stated of actions, JSON-like."""
+    return [int(no_op), None if distance is None else np.asarray(distance, np.float64).tolist()]
 
 
 def _check_spaces(name: str, environment: Any) -> None:

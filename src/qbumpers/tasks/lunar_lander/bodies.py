@@ -30,8 +30,8 @@ _READ = (X, Y, ANGLE, VELOCITY_X, VELOCITY_Y, SPIN)
 LEFT_LEG, RIGHT_LEG, CRASHED = 6, 7, 9
 """Places in the lander's state that contacts change."""
 
-_CORNERS = [(-14, 17), (-17, 0), (-17, -10), (17, -10), (17, 0), (14, 17)]
-_LEG_AWAY, _LEG_HALF_WIDTH, _LEG_HALF_HEIGHT, _LEG_TORQUE = 20 / SCALE, 2 / SCALE, 8 / SCALE, 40
+CORNERS = [(-14, 17), (-17, 0), (-17, -10), (17, -10), (17, 0), (14, 17)]
+LEG_AWAY, LEG_HALF_WIDTH, LEG_HALF_HEIGHT, _LEG_TORQUE = 20 / SCALE, 2 / SCALE, 8 / SCALE, 40
 _CHUNKS = 11
 _HULL = 2  # distinct from the legs, 0 and 1
 
@@ -119,7 +119,7 @@ def build(ground: list[Any], force: tuple[float, float], contacts: Contacts) -> 
     hull.ApplyForceToCenter(force, True)
     for number, side in enumerate((-1, 1)):
         leg = world.CreateDynamicBody(
-            position=(WIDTH / 2 - side * _LEG_AWAY, HEIGHT), angle=side * 0.05, fixtures=_leg()
+            position=(WIDTH / 2 - side * LEG_AWAY, HEIGHT), angle=side * 0.05, fixtures=_leg()
         )
         leg.userData = number
         world.CreateJoint(_hip(hull, leg, side))
@@ -128,7 +128,7 @@ def build(ground: list[Any], force: tuple[float, float], contacts: Contacts) -> 
 
 @functools.cache
 def _hull() -> Any:
-    corners = [(x / SCALE, y / SCALE) for x, y in _CORNERS]
+    corners = [(x / SCALE, y / SCALE) for x, y in CORNERS]
     return Box2D.b2FixtureDef(
         shape=Box2D.b2PolygonShape(vertices=corners),
         density=5.0,
@@ -142,7 +142,7 @@ def _hull() -> Any:
 @functools.cache
 def _leg() -> Any:
     return Box2D.b2FixtureDef(
-        shape=Box2D.b2PolygonShape(box=(_LEG_HALF_WIDTH, _LEG_HALF_HEIGHT)),
+        shape=Box2D.b2PolygonShape(box=(LEG_HALF_WIDTH, LEG_HALF_HEIGHT)),
         density=1.0,
         restitution=0.0,
         categoryBits=0x0020,
@@ -156,7 +156,7 @@ def _hip(hull: Any, leg: Any, side: int) -> Any:
         bodyA=hull,
         bodyB=leg,
         localAnchorA=(0, 0),
-        localAnchorB=(side * _LEG_AWAY, LEG_DOWN),
+        localAnchorB=(side * LEG_AWAY, LEG_DOWN),
         enableMotor=True,
         enableLimit=True,
         maxMotorTorque=_LEG_TORQUE,

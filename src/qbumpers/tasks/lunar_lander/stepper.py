@@ -200,6 +200,7 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         undoable=True,
         no_op=_NOTHING,
         action_distance=_ENGINES_THAT_DIFFER,
+        implied=(_NOTHING, _ENGINES_THAT_DIFFER),
     )
 
 

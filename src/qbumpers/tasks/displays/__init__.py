@@ -1,0 +1,1 @@
+"""Displays, one file per kind of task; `by_environment` finds those of Gymnasium's environments."""
