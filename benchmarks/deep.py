@@ -1,4 +1,4 @@
-"""People who learn the lunar lander by Double DQN: a step, a whole learner, two processes, memory.
+"""Learners of the lunar lander by Double DQN: a step, a whole learner, two processes, memory.
 
 Times of steps are of the processor, resets not counted, which a busy machine disturbs less than the
 clock on the wall. The engine plays a training episode and a greedy one in turn, so the resets of
@@ -26,7 +26,7 @@ from qbumpers.tasks.lunar_lander.stepper import Lander
 from qbumpers.values import NetworkValues
 
 SEED = 0  # of the terrain; Gymnasium's environment can have it too
-# As most of a learner's life: its exploration has come to an end.
+# As for most of a trial: exploration has come to an end.
 LEARNER = DoubleDQN(epsilon=Schedule(0.02, 0.02, 0.1))
 ASSISTANT = make_assistant("stochastic-q-bumpers", alpha=0.7)
 UNIT = "us"
@@ -35,7 +35,7 @@ FASTER = Target(8, at_least=True)
 _START_VALUE = 40.0  # what a good expert finds at the start
 _EPISODES = 60  # of a round, some 5,000 steps of each kind
 _WHOLE = 2_000  # training episodes of a learner of Figure 4, and greedy ones
-_LENGTHS = 240, 280  # steps of both, on average over a learner's life without help
+_LENGTHS = 240, 280  # steps of both, on average over an unassisted trial
 
 
 def expert() -> NetworkValues:
@@ -69,7 +69,7 @@ class Watch:
 
 
 class Steps(NamedTuple):
-    """Microseconds a training step, an evaluation step and a reset; a list has one a round."""
+    """Microseconds per training step, evaluation step and reset; a list has one per round."""
 
     training: Any
     evaluation: Any
@@ -77,12 +77,12 @@ class Steps(NamedTuple):
 
 
 def own_steps(trial: int) -> Steps:
-    """Microseconds of the engine's steps, of one person."""
+    """Microseconds of the engine's steps, of one trial."""
     watch = Watch()
     task = dataclasses.replace(lunar_lander(), make_stepper=lambda: watch)
     outcomes = run(condition_of(task), trials=range(trial, trial + 1)).outcomes
     times = np.array([*watch.times, time.process_time()])
-    playing = np.diff(times)[1::2].reshape(-1, 2)  # a row an episode: training, greedy
+    playing = np.diff(times)[1::2].reshape(-1, 2)  # a row per episode: training, greedy
     lengths = np.stack([outcomes.assisted_length[0], outcomes.unassisted_length[0]], axis=1)
     learning = np.cumsum(lengths[:, 0]) - lengths[:, 0] >= LEARNER.learning_starts
     training, evaluation = playing[learning].sum(axis=0) / lengths[learning].sum(axis=0) * 1e6
@@ -113,7 +113,7 @@ def against_plain_loops(rounds: int, steps: int) -> list[Row]:
         return found["own"][-1].training
 
     def theirs(_: int) -> float:
-        found["plain"].append(plain.live(steps))
+        found["plain"].append(plain.run(steps))
         return found["plain"][-1].training / found["plain"][-1].training_steps * 1e6
 
     def learn(_: int) -> float:
@@ -122,7 +122,7 @@ def against_plain_loops(rounds: int, steps: int) -> list[Row]:
         return (time.process_time() - begin) / steps * 1e6
 
     own_steps(0)  # compiles what is not compiled yet
-    plain.live(LEARNER.learning_starts)
+    plain.run(LEARNER.learning_starts)
     other.learn(LEARNER.learning_starts)
     training = alternate({"own": own, "plain": theirs, "other": learn}, rounds)
     evaluation = [times.evaluation / times.evaluation_steps * 1e6 for times in found["plain"]]
@@ -133,7 +133,7 @@ def against_plain_loops(rounds: int, steps: int) -> list[Row]:
             "plain PyTorch", training["plain"], Target(60),
         ),
         faster("  faster than plain PyTorch", training["own"], training["plain"]),
-        faster("  faster than SB3's DQN, no help", training["own"], training["other"]),
+        faster("  faster than SB3's DQN, unassisted", training["own"], training["other"]),
         compared(
             "deep learner, evaluation step", own_times.evaluation, UNIT,
             "plain PyTorch", evaluation, Target(25),
@@ -161,9 +161,9 @@ def whole_learner(times: Steps) -> Row:
 
 
 def block(condition: Condition, trial: int) -> tuple[float, float]:
-    """In a process of its own: steps a second of the clock on the wall, and its peak memory.
+    """In a process of its own: steps per second of the clock on the wall, and its peak memory.
 
-    Memory is of the whole process, in MB; NaN where the system does not tell.
+    Memory is of the whole process, in MB; NaN if the system does not tell.
     """
     begin = time.perf_counter()
     steps = run(condition, trials=range(trial, trial + 1)).steps
@@ -204,7 +204,7 @@ def processes(rounds: int) -> list[Row]:
 
 
 def measure(quick: bool) -> list[Row]:
-    """Every row of this benchmark; none where PyTorch or Stable-Baselines3 is not installed."""
+    """Every row of this benchmark; none if PyTorch or Stable-Baselines3 is not installed."""
     if not all(map(importlib.util.find_spec, ("torch", "stable_baselines3"))):
         print("PyTorch or Stable-Baselines3 is not installed: deep learners are left out.")
         return []

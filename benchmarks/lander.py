@@ -25,7 +25,7 @@ def episodes(pilot: bool, steps: int) -> list[list[int]]:
     """Actions of whole episodes.
 
     Args:
-        pilot: whether somebody lands, now and then clumsily; otherwise actions are random.
+        pilot: whether a pilot lands, now and then clumsily; otherwise actions are random.
         steps: of all episodes together, at least.
 
     Returns:
@@ -49,7 +49,7 @@ def episodes(pilot: bool, steps: int) -> list[list[int]]:
 def step_time(
     reset: Callable[[], Any], step: Callable[[int], Any], played: list[list[int]]
 ) -> Timed:
-    """Microseconds a step, resets not counted.
+    """Microseconds per step, resets not counted.
 
     Args:
         reset: starts an episode.
@@ -74,7 +74,7 @@ def step_time(
 
 
 def reset_time(reset: Callable[[], Any], times: int) -> Timed:
-    """Microseconds a reset."""
+    """Microseconds per reset."""
 
     def timed(_: int) -> float:
         begin = time.process_time()

@@ -17,11 +17,13 @@ from stable_baselines3 import DQN
 from torch import nn
 
 from qbumpers.assistants import Assistant
-from qbumpers.decisions import Noise, Situation
+from qbumpers.decisions import Noise, begin, settle, situate
 from qbumpers.learners import DoubleDQN
 from qbumpers.values import NetworkValues
 
 ENVIRONMENT = "LunarLander-v3"
+
+_NO_OTHERS = np.zeros((0, 4))  # further rows of values, of which the rule names none
 
 
 class Times(NamedTuple):
@@ -66,7 +68,7 @@ class Replay:
 
 
 class PlainLearner:
-    """A person who learns to land by Double DQN while an assistant helps.
+    """A simulated learner that learns to land by Double DQN, assisted.
 
     Args:
         settings: of the learner; its exploration is the last of the schedule throughout.
@@ -90,8 +92,8 @@ class PlainLearner:
         self._optimiser = torch.optim.Adam(self._network.parameters(), lr=settings.learning_rate)
         self._replay = Replay(settings.replay_size, expert.inputs)
 
-    def live(self, steps: int) -> Times:
-        """Episodes with help and learning, each followed by a greedy one, for so many steps."""
+    def run(self, steps: int) -> Times:
+        """Assisted episodes with learning, each followed by a greedy one, for so many steps."""
         times = Times(0.0, 0, 0.0, 0)
         while times.training_steps < steps:
             trained, length = self._timed(self._assisted_episode)
@@ -112,21 +114,19 @@ class PlainLearner:
 
     def _assisted_episode(self, observation: np.ndarray) -> int:
         length, ended = 0, False
-        earned, discount = 0.0, 1.0
-        start_value = float(values_of(self._expert, observation).max())
+        account = begin(values_of(self._expert, observation), 0)
         while not ended:
-            situation = Situation(
-                values_of(self._expert, observation), self._propose(observation), earned, discount,
-                start_value,
-            )  # fmt: skip
+            values, proposed = values_of(self._expert, observation), self._propose(observation)
+            situation = situate(account, observation, values, _NO_OTHERS, proposed)
             noise = Noise(self._generator.random(), self._generator.random())
             executed = int(self._assistant.decide(situation, noise).action)
-            following, reward, terminated, truncated, _ = self._environment.step(executed)
+            next_observation, reward, terminated, truncated, _ = self._environment.step(executed)
             reward = float(reward)
-            self._replay.add(observation, situation.proposed, reward, following, 1.0 - terminated)
+            self._replay.add(observation, proposed, reward, next_observation, 1.0 - terminated)
             self._learn()
-            earned, discount = earned + discount * reward, discount * self._settings.discount
-            observation, length, ended = following, length + 1, terminated or truncated
+            account = settle(account, reward, self._settings.discount)
+            observation, length = next_observation, length + 1
+            ended = terminated or truncated
         return length
 
     def _greedy_episode(self, observation: np.ndarray) -> int:
@@ -146,15 +146,15 @@ class PlainLearner:
         settings, seen = self._settings, self._replay.seen
         if seen < settings.learning_starts:
             return
-        observations, actions, rewards, following, goes_on = self._replay.sample(
+        observations, actions, rewards, next_observations, goes_on = self._replay.sample(
             settings.batch_size, self._generator
         )
         with torch.no_grad():
-            preferred = self._network(following).argmax(1, keepdim=True)
-            future = self._target(following).gather(1, preferred)[:, 0]
-            wanted = rewards + settings.discount * goes_on * future
+            preferred = self._network(next_observations).argmax(1, keepdim=True)
+            future = self._target(next_observations).gather(1, preferred)[:, 0]
+            targets = rewards + settings.discount * goes_on * future
         found = self._network(observations).gather(1, actions[:, None])[:, 0]
-        loss = nn.functional.huber_loss(found, wanted)
+        loss = nn.functional.huber_loss(found, targets)
         self._optimiser.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(self._network.parameters(), settings.gradient_limit)

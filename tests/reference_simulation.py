@@ -1,9 +1,11 @@
-"""Rules, learner and trial a second time: plain Python, one number after the other.
+"""Rules, learners and trial a second time: plain Python, one number after the other.
 
-Written from Algorithm 1 and Section 4.2 of the paper, to be compared with the package. It takes
-from the package only its containers of data (task, learner, situation) and the names of conditions.
+Written from Algorithm 1 and Section 4.2 of the paper, and from Sutton and Barto, to be compared
+with the package. It takes from the package only its containers of data (task, learner, situation)
+and the names of conditions.
 """
 
+import collections
 import hashlib
 import json
 from types import SimpleNamespace
@@ -56,8 +58,8 @@ def logistic(ratio, p_max):
 def stochastic_q_bumpers(
     situation, noise, alpha, v_min=0.0, p_max=0.999, second=False, escalate=True, clip=True
 ):
-    values, proposed, earned, discount, start_value = situation
-    values = list(values)
+    values, proposed = list(situation.values), situation.proposed
+    earned, discount, start_value = situation.earned, situation.discount, situation.start_value
     candidate = replacement_value(values, second)
     if values[proposed] >= candidate:
         return proposed, 0.0
@@ -75,12 +77,58 @@ def stochastic_q_bumpers(
     return (one_of(values, candidate, noise.tie) if overrides else proposed), probability
 
 
+def take_back(situation, noise, tolerance):
+    """An own rule of the tests: half of the proposals that give up too much are undone."""
+    values = list(situation.values)
+    if values[situation.proposed] >= max(values) - tolerance:
+        return situation.proposed, 0.0, False
+    return situation.proposed, 0.5, noise.coin < 0.5
+
+
 RULES = {
     "none": none,
     "maximal": maximal,
     "local-q-thresholding": local_q_thresholding,
     "stochastic-q-bumpers": stochastic_q_bumpers,
+    "take-back": take_back,
 }
+
+
+class PlainRule:
+    """A rule with its options; it never remembers anything."""
+
+    def __init__(self, name, **options):
+        self.name, self.options = name, options
+
+    def decide(self, situation, noise):
+        return RULES[self.name](situation, noise, **self.options)
+
+    def observe(self, step):
+        pass
+
+
+class PlainBudget:
+    """Another rule, until it has overridden so often in one episode."""
+
+    def __init__(self, of, per_episode):
+        self.of, self.per_episode = plain_rule(**of), per_episode
+        self.spent = collections.Counter()
+
+    def decide(self, situation, noise):
+        decision = self.of.decide(situation, noise)
+        if self.spent[situation.episode] < self.per_episode:
+            return decision
+        overrides = decision[0] != situation.proposed or True in decision[2:]
+        return (situation.proposed, 0.0) if overrides else decision
+
+    def observe(self, step):
+        self.of.observe(step)
+        self.spent[step.episode] += step.executed != step.proposed or step.undone
+
+
+def plain_rule(name, **options):
+    """The plain form of an assistant, as a file would describe it."""
+    return PlainBudget(**options) if name == "budget" else PlainRule(name, **options)
 
 
 class _Words(np.random.bit_generator.ISeedSequence):
@@ -126,17 +174,36 @@ def scheduled(schedule, episode, episodes):
     return schedule.start + episode / decaying * (schedule.end - schedule.start)
 
 
-def learned_from(perception, proposed, executed, reward, penalty):
-    """(action, reward) that a learner takes from a step; None where it learns nothing."""
-    if proposed == executed:
-        return proposed, reward
+PERCEPTIONS = {
+    "transition": (0, "proposed", False),
+    "observant": (1, "executed", False),
+    "interruption": (1, "nothing", False),
+    "disruption": (1, "executed", True),
+    "transition-disruption": (1, "proposed", True),
+}
+"""Probability of noticing an override, what is credited then, and whether it is disliked."""
+
+
+def perceived(perception, penalty):
+    """(notices, credits, penalty) of a perception or of the name of one."""
+    if isinstance(perception, str):
+        notices, credits, disliked = PERCEPTIONS[perception]
+        return notices, credits, penalty if disliked else 0.0
+    return perception.notices, perception.credits, perception.penalty
+
+
+def learned_from(perception, proposed, executed, undone, reward, coin):
+    """(action, reward, whether it seemed to lead back) taken from a step; None for nothing."""
+    notices, credits, penalty = perception
+    if proposed == executed and not undone:
+        return proposed, reward, False
+    if not coin < notices:  # it looks like the learner's own doing
+        return proposed, reward, undone
     return {
-        "transition": (proposed, reward),
-        "observant": (executed, reward),
-        "interruption": None,
-        "disruption": (executed, reward - penalty),
-        "transition-disruption": (proposed, reward - penalty),
-    }[perception]
+        "executed": (executed, reward - penalty, False),
+        "proposed": (proposed, reward - penalty, undone),
+        "nothing": None,
+    }[credits]
 
 
 def draw_index(probabilities, generator):
@@ -154,8 +221,9 @@ def draw_index(probabilities, generator):
 class ReferenceTrial:
     """One trial of a condition.
 
-    `rule(situation, noise) -> (action, probability)` decides; where it remembers, `observe(step)`
-    is called after every assisted step. After `run`, `episodes`, `steps` and `counts` are filled.
+    `rule(situation, noise) -> (action, probability[, undo])` decides; if it remembers,
+    `observe(step)` is called after every assisted step. After `run`, `episodes`, `steps` and
+    `counts` are filled.
     """
 
     def __init__(self, condition, rule, *, seed, trial, observe=None):
@@ -163,8 +231,12 @@ class ReferenceTrial:
         self.rule, self.observe = rule, observe
         self.seed, self.trial = seed, trial
         self.draw_from(seeded_bit_generators(seed, condition.learning(), trial))
-        table = np.full(condition.values.shape, float(self.learner.initial_value))
-        self.own_values = table.tolist()
+        self.perception = perceived(condition.perception, condition.penalty)
+        self.own_values = [
+            [float(self.learner.initial_value)] * self.task.actions
+            for _ in range(self.task.states)
+        ]
+        self.ahead = None  # (state, action) that a learner of SARSA has chosen already
         self.episodes, self.steps = [], []
         self.counts = {
             name: np.zeros(self.task.states, np.int64)
@@ -180,6 +252,8 @@ class ReferenceTrial:
             if self.condition.common_random_numbers:
                 common = {"common_random_numbers": True}
                 self.draw_from(bit_generators_of_episode(self.seed, common, self.trial, episode))
+            if episode > 0:
+                self.forget(self.condition.forgetting)
             helped = episode < self.condition.episodes
             assisted = self.training_episode(episode, helped)
             unassisted = self.greedy_episode(helped)
@@ -188,6 +262,12 @@ class ReferenceTrial:
                 | {f"unassisted_{name}": value for name, value in unassisted.items()}
             )
         return self
+
+    def forget(self, share):
+        if share == 0:
+            return
+        for own in self.own_values:
+            own[:] = [value + share * (self.learner.initial_value - value) for value in own]
 
     def first_state(self, generator):
         starts = np.flatnonzero(self.task.start)
@@ -206,40 +286,75 @@ class ReferenceTrial:
 
     def greedy_episode(self, counted):
         state, total, length, events, ended = self.first_state(self.greedy), 0.0, 0, 0, False
+        action = None
         while length < self.task.episode_limit and not ended:
             self.counts["unassisted"][state] += counted
             own = self.own_values[state]
-            action = one_of(own, max(own), self.greedy.random())
+            action = self.hand(one_of(own, max(own), self.greedy.random()), action, self.greedy)
             state, reward, ended, happened = self.outcome(state, action, self.greedy)
             total, length, events = total + reward, length + 1, events | happened
-        return {"return": total, "length": length, "events": events}
+        return {"return": total, "length": length, "events": events if ended else events | 16}
 
-    def propose(self, state, epsilon):
+    def hand(self, meant, last, generator):
+        """What is done instead of what was meant; `last` is None on the first step."""
+        slip, lag = self.condition.motor
+        done = meant
+        if slip > 0 and generator.random() < slip:
+            others = [action for action in range(self.task.actions) if action != meant]
+            done = others[int(generator.random() * len(others))]
+        if lag > 0 and last is not None and generator.random() < lag:
+            done = last
+        return done
+
+    def explored(self, state, epsilon):
+        """An epsilon-greedy action."""
         coin, tie = self.explore.random(), self.explore.random()
         own = self.own_values[state]
         if coin < epsilon:
             return int(tie * len(own))
         return one_of(own, max(own), tie)
 
+    def mean(self, state, epsilon):
+        """What the action is chosen for."""
+        if self.ahead is not None and self.ahead[0] == state:
+            return self.ahead[1]
+        return self.explored(state, epsilon)
+
+    def decided(self, situation, noise, helped):
+        """(executed, probability, undone)."""
+        if not helped:
+            return situation.proposed, 0.0, False
+        return (*self.rule(situation, noise), False)[:3]
+
     def training_episode(self, episode, helped):
         epsilon = scheduled(self.learner.epsilon, episode, self.condition.episodes)
         rate = scheduled(self.learner.learning_rate, episode, self.condition.episodes)
-        state = self.first_state(self.nature)
+        state, self.ahead = self.first_state(self.nature), None
         start_value = max(self.condition.values[state].tolist())
         earned, discount, first_step = 0.0, 1.0, len(self.steps)
-        total, events, ended = 0.0, 0, False
-        while len(self.steps) - first_step < self.task.episode_limit and not ended:
+        total, events, ended, last, limit = 0.0, 0, False, None, self.task.episode_limit
+        while len(self.steps) - first_step < limit and not ended:
             values = self.condition.values[state].tolist()
-            proposed = self.propose(state, epsilon)
+            proposed = self.hand(self.mean(state, epsilon), last, self.explore)
             noise = Noise(self.noise.random(), self.noise.random())
-            situation = Situation(values, proposed, earned, discount, start_value)
-            executed, probability = self.rule(situation, noise) if helped else (proposed, 0.0)
-            next_state, reward, ended, happened = self.outcome(state, executed, self.nature)
-            credited = self.learn(state, proposed, executed, reward, next_state, ended, rate)
+            situation = Situation(
+                state=state, values=np.array(values), others=self.condition.others[state],
+                proposed=proposed, earned=earned, discount=discount, start_value=start_value,
+                episode=episode, step=len(self.steps) - first_step,
+            )  # fmt: skip
+            executed, probability, undone = self.decided(situation, noise, helped)
+            next_state, reward, would_end, happened = self.outcome(state, executed, self.nature)
+            ended = would_end and not undone
+            happened -= would_end - ended
+            if not ended and len(self.steps) - first_step == limit - 1:
+                happened += 16
+            credited = self.learn(
+                state, proposed, executed, undone, reward, next_state, would_end, epsilon, rate
+            )
             step = SimpleNamespace(
                 episode=episode, state=state, next_state=next_state, events=happened,
-                proposed=proposed, executed=executed,
-                credited=credited, overridden=executed != proposed, probability=probability,
+                proposed=proposed, executed=executed, undone=undone, credited=credited,
+                overridden=executed != proposed or undone, probability=probability,
                 coin=noise.coin, tie=noise.tie, values=values,
                 projected_return=earned + discount * values[proposed], reward=reward,
             )  # fmt: skip
@@ -250,7 +365,8 @@ class ReferenceTrial:
             self.counts["overridden"][state] += step.overridden
             earned = earned + discount * reward
             discount = discount * self.condition.discount
-            total, events, state = total + reward, events | happened, next_state
+            total, events, last = total + reward, events | happened, proposed
+            state = state if undone else next_state
         steps = self.steps[first_step:]
         return {
             "return": total,
@@ -259,15 +375,35 @@ class ReferenceTrial:
             "overrides": sum(step.overridden for step in steps),
         }
 
-    def learn(self, state, proposed, executed, reward, next_state, ended, rate):
-        """The Q-learning update; returns the credited action, -1 where nothing is learned."""
-        learned = learned_from(
-            self.condition.perception, proposed, executed, reward, self.learner.penalty
-        )
+    def learn(
+        self, state, proposed, executed, undone, reward, next_state, would_end, epsilon, rate
+    ):
+        """One update; returns the credited action, -1 if nothing is learned."""
+        self.ahead = None
+        coin, overridden = 0.0, executed != proposed or undone
+        if overridden and 0 < self.perception[0] < 1:
+            coin = self.explore.random()
+        learned = learned_from(self.perception, proposed, executed, undone, reward, coin)
         if learned is None:
             return -1
-        action, believed_reward = learned
-        future = 0.0 if ended else self.learner.discount * max(self.own_values[next_state])
+        action, believed_reward, back = learned
+        future = 0.0
+        if back or not would_end:
+            led_to = state if back else next_state
+            future = self.learner.discount * self.value(led_to, epsilon)
         old = self.own_values[state][action]
         self.own_values[state][action] = old + rate * (believed_reward + future - old)
         return action
+
+    def value(self, state, epsilon):
+        """What a state is worth: to SARSA the next action's value, chosen here and now."""
+        own, kind = self.own_values[state], type(self.learner).__name__
+        if kind == "Sarsa":
+            self.ahead = state, self.explored(state, epsilon)
+            return own[self.ahead[1]]
+        if kind == "ExpectedSarsa":
+            total = 0.0
+            for value in own:
+                total += value
+            return (1 - epsilon) * max(own) + epsilon * total / len(own)
+        return max(own)

@@ -92,12 +92,15 @@ def through_plain_python(recording):
         steps = zip(*(episode[name].tolist() for name in ("proposed", "coin", "tie")), strict=True)
         for proposed, coin, tie in steps:
             values = action_values(cell)
-            situation = Situation(values, proposed, earned, 1.0, value(START))
+            state = cell[0] * COLUMNS_OF_GRID + cell[1]
+            situation = Situation(
+                state, np.array(values), np.zeros((0, 4)), proposed, earned, 1.0, value(START),
+                len(replayed), len(rows),
+            )  # fmt: skip
             executed, probability = stochastic_q_bumpers(
                 situation, Noise(coin, tie), **recording["assistant"]["options"]
             )
             after, reward, _ = moved(cell, executed)
-            state = cell[0] * COLUMNS_OF_GRID + cell[1]
             projected = earned + values[proposed]
             rows.append((state, proposed, coin, tie, executed, probability, projected, reward))
             cell, earned = after, earned + reward

@@ -24,8 +24,8 @@ from tests.shared_control_examples import (
 from tests.tasks.examples import random_task
 
 KEYS = {
-    "proposed", "executed", "credited", "overridden", "probability", "coin", "tie", "values",
-    "projected_return", "reward",
+    "episode", "state", "proposed", "executed", "undone", "credited", "overridden", "probability",
+    "coin", "tie", "values", "projected_return", "reward", "next_state", "events",
 }  # fmt: skip
 
 

@@ -20,10 +20,14 @@ LAKE_BUMPERS = bumpers(alpha=0.9, v_min=-0.1)
 
 
 def session(environment: gymnasium.Env, episodes: int = 4, **reset) -> list:
-    """What several episodes returned; only the first is seeded."""
+    """What several episodes returned; only the first is seeded. Their numbers start at 0."""
     returned = plain(play(environment, ACTIONS, **reset))
     for _ in range(episodes - 1):
         returned += plain(play(environment, ACTIONS))
+    records = [step[-1]["assistance"] for step in returned if "assistance" in step[-1]]
+    before = records[0]["episode"] if records else 0
+    for record in records:
+        record["episode"] -= before
     return returned
 
 

@@ -93,7 +93,17 @@ def _kept(function: Any, settings: dict[str, Any]) -> Any:
     dispatcher: Any = numba.njit(**settings)(function)
     with contextlib.suppress(RuntimeError):  # without a writable folder, every process compiles
         dispatcher._cache = _PackageCache(function)
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda kinds, named: template(map(_any_integer, kinds), named)
     return dispatcher
+
+
+def _any_integer(kind: Any) -> Any:
+    """Numba's type of any integer for that of a certain one.
+
+    A call with a number written out would compile the function, and all that it calls, once more.
+    """
+    return numba.types.unliteral(kind) if isinstance(kind, numba.types.IntegerLiteral) else kind
 
 
 def compiled_for_session(function: F) -> F:

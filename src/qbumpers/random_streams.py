@@ -93,7 +93,8 @@ def _warmed(seeds: np.ndarray) -> np.ndarray:
     for trial in range(trials):
         for stream in range(streams):
             state = states[trial, stream]
-            state[:words] = seeds[trial, stream]
+            for word in range(words):
+                state[word] = seeds[trial, stream, word]
             for _ in range(12):
                 draw(state)
     return states

@@ -1,7 +1,7 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
 from pathlib import Path
-from typing import Any, SupportsFloat, cast
+from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
@@ -125,10 +125,10 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         observation, info = self.env.reset(seed=seed, options=options or None)
         self._session.begin(observation)
         self._observation, self._total, self._overrides = observation, 0.0, 0
-        account, row = self._session.account, self._session.values_now
+        account, row = self._session.account, np.array(self._session.values_now)
         state = self._session.state
         first = Step(
-            account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, cast(Any, row),
+            account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, row,
             account.start_value, 0.0, state, 0,
         )  # fmt: skip
         return observation, {**info, RECORD: first._asdict()}
@@ -202,8 +202,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._undo[1](before)
 
     def _shown(self, step: Step) -> Step:
-        """A record with actions as the environment numbers them."""
-        first = self._first_action
+        """A record for whoever steps: values of its own, actions as the environment numbers them."""
+        step, first = step._replace(values=step.values.copy()), self._first_action
         if not first:
             return step
         return step._replace(

@@ -40,7 +40,7 @@ class BudgetOptions(NamedTuple):
     budget: Annotated[int, Field(ge=0)]
 
 
-def full_budget(options):
+def full_budget(options, model):
     return options.budget
 
 
@@ -54,3 +54,15 @@ def guide_within_budget(situation, noise, options, memory):
     if memory <= 0 or situation.values[situation.proposed] >= best:
         return Decision(situation.proposed, 0.0)
     return Decision(pick(situation.values, best, noise.tie), 1.0)
+
+
+class TakeBackOptions(NamedTuple):
+    tolerance: float = 1.5
+
+
+def take_back(situation, noise, options):
+    """Half of the proposals that give up more than the tolerance are undone."""
+    best = best_value(situation.values)
+    if situation.values[situation.proposed] >= best - options.tolerance:
+        return Decision(situation.proposed, 0.0, False)
+    return Decision(situation.proposed, 0.5, noise.coin < 0.5)

@@ -7,13 +7,14 @@ from qbumpers.assistants.local_q_thresholding import (
     LocalQThresholdingOptions,
     local_q_thresholding,
 )
-from qbumpers.decisions import Noise, Situation
+from qbumpers.decisions import Decision, Noise
 from tests import reference_simulation as plain
 from tests.assistants.situations import (
     assert_decides,
     assert_overrides_only_by_better,
     fractions,
     noises,
+    situation_of,
     situations,
 )
 
@@ -28,7 +29,7 @@ THRESHOLD = (94 - 92) / (94 + 13)
 
 
 def decide(values, proposed, alpha, second=False):
-    situation = Situation(values, proposed, 0.0, 1.0, 87.0)
+    situation = situation_of(values, proposed, start_value=87.0)
     return local_q_thresholding(
         situation, Noise(0.5, 0.0), LocalQThresholdingOptions(alpha, second)
     )
@@ -48,7 +49,7 @@ def test_never_overrides_by_an_action_that_is_no_better(situation, noise, option
 @given(situations(), noises, st.booleans())
 def test_alpha_1_never_overrides(situation, noise, second):
     decision = local_q_thresholding(situation, noise, LocalQThresholdingOptions(1.0, second))
-    assert decision == (situation.proposed, 0.0)
+    assert decision == Decision(situation.proposed, 0.0)
 
 
 @given(situations(), noises, st.booleans())
@@ -68,24 +69,24 @@ def test_beside_the_cliff_moving_away_is_overridden_below_the_papers_threshold(
     proposed, alpha, overridden
 ):
     decision = decide(BESIDE_THE_CLIFF, proposed, alpha)
-    assert decision == ((RIGHT, 1.0) if overridden else (proposed, 0.0))
+    assert decision == Decision(*(RIGHT, 1.0) if overridden else (proposed, 0.0))
 
 
 @pytest.mark.parametrize("alpha", [0.0, THRESHOLD, 0.5, 0.999])
 def test_beside_the_cliff_stepping_off_is_overridden_at_every_alpha_below_1(alpha):
-    assert decide(BESIDE_THE_CLIFF, DOWN, alpha) == (RIGHT, 1.0)
+    assert decide(BESIDE_THE_CLIFF, DOWN, alpha) == Decision(RIGHT, 1.0)
 
 
 @pytest.mark.parametrize("alpha", [0.0, THRESHOLD, 0.5, 0.999])
 @pytest.mark.parametrize("proposed", [UP, LEFT])
 def test_one_row_up_moving_away_is_overridden_at_every_alpha_below_1(proposed, alpha):
-    assert decide(ONE_ROW_UP, proposed, alpha) == (RIGHT, 1.0)
+    assert decide(ONE_ROW_UP, proposed, alpha) == Decision(RIGHT, 1.0)
 
 
 def test_one_row_up_nothing_is_worse_than_the_second_best():
     for proposed in range(4):
-        assert decide(ONE_ROW_UP, proposed, 0.0, second=True) == (proposed, 0.0)
+        assert decide(ONE_ROW_UP, proposed, 0.0, second=True) == Decision(proposed, 0.0)
 
 
 def test_second_best_replaces_the_step_off_the_cliff():
-    assert decide(BESIDE_THE_CLIFF, DOWN, 0.5, second=True) == (UP, 1.0)
+    assert decide(BESIDE_THE_CLIFF, DOWN, 0.5, second=True) == Decision(UP, 1.0)

@@ -1,6 +1,7 @@
 from hypothesis import given
 
 from qbumpers.assistants.maximal import MaximalOptions, maximal
+from qbumpers.decisions import Decision
 from tests import reference_simulation as plain
 from tests.assistants.situations import (
     assert_decides,
@@ -21,7 +22,7 @@ def test_executes_a_best_action_and_keeps_the_proposal_where_it_is_one(situation
     decision = maximal(situation, noise, MaximalOptions())
     assert values[decision.action] == values.max()
     if values[situation.proposed] == values.max():
-        assert decision == (situation.proposed, 0.0)
+        assert decision == Decision(situation.proposed, 0.0)
     else:
         assert decision.probability == 1.0
 

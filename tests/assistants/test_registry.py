@@ -1,13 +1,12 @@
 import pickle
 from typing import Annotated, NamedTuple
 
-import numpy as np
 import pytest
 from pydantic import Field
 
 from qbumpers.assistants import assistants, make_assistant, register_assistant
 from qbumpers.assistants.maximal import MaximalOptions
-from qbumpers.decisions import Decision, Noise, Situation, Step
+from qbumpers.decisions import Decision, Noise
 from qbumpers.errors import RequestError
 from tests.assistants.own_rules import (
     BudgetOptions,
@@ -19,18 +18,21 @@ from tests.assistants.own_rules import (
     spend,
     watch,
 )
+from tests.assistants.situations import model_of, situation_of, step_of
 
-SITUATION = Situation(np.array([1.0, 3.0, 3.0]), 0, 0.0, 1.0, 3.0)
+SITUATION = situation_of([1.0, 3.0, 3.0], 0)
 NOISE = Noise(0.5, 0.5)
 
 
 def overridden_step():
-    return Step(0, 2, 0, True, 1.0, 0.5, 0.5, SITUATION.values, 1.0, -1.0)
+    return step_of(SITUATION, 2)
 
 
-def test_the_four_assistants_of_the_package_are_registered():
-    built_in = {name for name, rule in assistants().items() if rule.built_in}
-    assert built_in == {"none", "maximal", "local-q-thresholding", "stochastic-q-bumpers"}
+def test_every_assistant_of_the_package_is_compiled_for_every_task():
+    built_in = [rule for rule in assistants().values() if rule.built_in]
+    assert len(built_in) >= 5
+    for rule in built_in:
+        assert rule.compiles_for == {"states", "vectors"}, rule.name
 
 
 def test_options_that_are_not_given_take_the_papers_values():
@@ -129,7 +131,7 @@ def test_a_pickled_own_assistant_takes_the_rule_registered_where_it_arrives():
     register_assistant("guide", NoOptions)(watch)
     sent = pickle.dumps(make_assistant("guide"))
     register_assistant("guide", NoOptions)(guide)
-    assert pickle.loads(sent).decide(SITUATION, NOISE) == (2, 1.0)
+    assert pickle.loads(sent).decide(SITUATION, NOISE) == Decision(2, 1.0)
 
 
 @pytest.mark.usefixtures("own_registry")
@@ -138,7 +140,7 @@ def test_an_own_rule_is_compiled_and_the_function_stays_what_it_was():
     assistant = make_assistant("guide")
     assert assistant.rule.compiled
     assert not assistant.rule.built_in
-    assert assistant.decide(SITUATION, NOISE) == (2, 1.0)
+    assert assistant.decide(SITUATION, NOISE) == Decision(2, 1.0)
 
 
 @pytest.mark.usefixtures("own_registry")
@@ -158,8 +160,8 @@ def test_a_rule_registered_again_decides_from_then_on():
     register_assistant("guide", NoOptions)(watch)
     before = make_assistant("guide")
     register_assistant("guide", NoOptions)(guide)
-    assert make_assistant("guide").decide(SITUATION, NOISE) == (2, 1.0)
-    assert before.decide(SITUATION, NOISE) == (0, 0.0)
+    assert make_assistant("guide").decide(SITUATION, NOISE) == Decision(2, 1.0)
+    assert before.decide(SITUATION, NOISE) == Decision(0, 0.0)
 
 
 @pytest.mark.usefixtures("own_registry")
@@ -168,7 +170,7 @@ def test_a_rule_with_memory_spends_it():
         guide_within_budget
     )
     assistant = make_assistant("budget", budget=2)
-    memory, probabilities = assistant.start(), []
+    memory, probabilities = assistant.start(model_of()), []
     for _ in range(3):
         probabilities.append(assistant.decide(SITUATION, NOISE, memory).probability)
         memory = assistant.observe(memory, overridden_step())
@@ -186,7 +188,7 @@ def test_bounds_of_own_options_are_checked():
 
 def test_a_memoryless_rule_leaves_memory_alone():
     assistant = make_assistant("maximal")
-    assert assistant.start() is None
+    assert assistant.start(model_of()) == 0
     assert assistant.observe("anything", overridden_step()) == "anything"
 
 
@@ -206,7 +208,7 @@ def test_whole_number_options_may_serve_as_indices_in_a_compiled_rule():
     register_assistant("favourite", PreferenceOptions)(insist_on_favourite)
     assistant = make_assistant("favourite", favourite=1)
     assert assistant.rule.compiled
-    assert assistant.decide(SITUATION, NOISE) == (1, 1.0)
+    assert assistant.decide(SITUATION, NOISE) == Decision(1, 1.0)
 
 
 @pytest.mark.usefixtures("own_registry")

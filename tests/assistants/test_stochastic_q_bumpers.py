@@ -11,7 +11,7 @@ from qbumpers.assistants.stochastic_q_bumpers import (
     override_probability,
     stochastic_q_bumpers,
 )
-from qbumpers.decisions import Noise, Situation
+from qbumpers.decisions import Decision, Noise
 from tests import reference_simulation as plain
 from tests.assistants.situations import (
     PROBABILITY_TOLERANCE,
@@ -19,6 +19,7 @@ from tests.assistants.situations import (
     assert_overrides_only_by_better,
     fractions,
     noises,
+    situation_of,
     situations,
 )
 
@@ -53,7 +54,7 @@ def test_alpha_0_overrides_every_action_worse_than_the_candidate(situation, nois
     candidate = plain.replacement_value(situation.values.tolist(), options.second)
     decision = stochastic_q_bumpers(situation, noise, options)
     if situation.values[situation.proposed] >= candidate:
-        assert decision == (situation.proposed, 0.0)
+        assert decision == Decision(situation.proposed, 0.0)
     else:
         assert decision.probability == 1.0
         assert situation.values[decision.action] >= candidate
@@ -62,7 +63,8 @@ def test_alpha_0_overrides_every_action_worse_than_the_candidate(situation, nois
 @given(situations(), noises, options_of_any_kind)
 def test_an_escalated_override_executes_a_best_action_surely(situation, noise, options):
     options = options._replace(escalate=True, second=True)
-    values, proposed, earned, discount, start_value = situation
+    values, proposed = situation.values, situation.proposed
+    earned, discount, start_value = situation.earned, situation.discount, situation.start_value
     candidate = plain.replacement_value(values.tolist(), True)
     lower_value = start_value - options.alpha * (start_value - options.v_min)
     decision = stochastic_q_bumpers(situation, noise, options)
@@ -130,13 +132,13 @@ def test_worse_proposals_are_overridden_with_no_smaller_probability(
 @pytest.mark.parametrize("proposed", [0, 2])
 def test_coin_below_the_probability_overrides_and_at_it_does_not(proposed):
     # V = 87, earned -10, so Q* 86 loses 11 of the 60.9 that alpha 0.7 allows.
-    situation = Situation(np.array([86.0, 97.0, 86.0, 90.0]), proposed, -10.0, 1.0, 87.0)
+    situation = situation_of([86.0, 97.0, 86.0, 90.0], proposed, -10.0, start_value=87.0)
     options = StochasticQBumpersOptions(0.7)
     probability = stochastic_q_bumpers(situation, Noise(0.5, 0.5), options).probability
     assert probability == pytest.approx(plain.logistic(11 / 60.9, 0.999), abs=1e-12)
     below, at = Noise(np.nextafter(probability, 0.0), 0.5), Noise(probability, 0.5)
-    assert stochastic_q_bumpers(situation, below, options) == (1, probability)
-    assert stochastic_q_bumpers(situation, at, options) == (proposed, probability)
+    assert stochastic_q_bumpers(situation, below, options) == Decision(1, probability)
+    assert stochastic_q_bumpers(situation, at, options) == Decision(proposed, probability)
 
 
 @pytest.mark.parametrize(
@@ -144,14 +146,14 @@ def test_coin_below_the_probability_overrides_and_at_it_does_not(proposed):
 )
 def test_escalation_begins_where_the_candidate_only_reaches_the_lower_value(candidate, executed):
     # The lower value is 100 - 0.5 * 100 = 50.
-    situation = Situation(np.array([40.0, candidate, 60.0]), 0, 0.0, 1.0, 100.0)
+    situation = situation_of([40.0, candidate, 60.0], 0, start_value=100.0)
     options = StochasticQBumpersOptions(0.5, second=True)
-    assert stochastic_q_bumpers(situation, Noise(0.9999, 0.5), options) == (executed, 1.0)
+    assert stochastic_q_bumpers(situation, Noise(0.9999, 0.5), options) == Decision(executed, 1.0)
 
 
 @pytest.mark.parametrize(("clip", "probability"), [(True, 1.0), (False, 0.999)])
 def test_an_action_that_loses_all_the_room_is_overridden_surely_where_clipped(clip, probability):
-    situation = Situation(np.array([50.0, 60.0, 90.0]), 0, 0.0, 1.0, 100.0)
+    situation = situation_of([50.0, 60.0, 90.0], 0, start_value=100.0)
     decision = stochastic_q_bumpers(
         situation, Noise(0.5, 0.5), StochasticQBumpersOptions(0.5, clip=clip)
     )

@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers.learners import QLearner, Schedule
-from qbumpers.learners.q_learning import choose, choose_greedily, learned, scheduled
+from qbumpers.learners.epsilon_greedy import epsilon_greedy, greedy
+from qbumpers.learners.q_learning import q_update
+from qbumpers.learners.schedules import scheduled
 
 unit = st.floats(0, 1)
 chances = st.floats(0, 1, exclude_max=True)
@@ -39,32 +41,32 @@ def test_the_papers_learner_is_undiscounted_and_starts_at_zero():
 
 @given(rows, chances, chances)
 def test_greedy_choice_is_a_best_action(row, coin, tie):
-    assert row[choose_greedily(row, tie)] == row.max()
-    assert choose(row, 0.0, coin, tie) == choose_greedily(row, tie)
+    assert row[greedy(row, tie)] == row.max()
+    assert epsilon_greedy(row, 0.0, coin, tie) == greedy(row, tie)
 
 
 @given(rows, chances, unit, chances)
 def test_exploration_happens_where_the_coin_falls_below_epsilon(row, coin, epsilon, tie):
-    expected = int(tie * len(row)) if coin < epsilon else choose_greedily(row, tie)
-    assert choose(row, epsilon, coin, tie) == expected
+    expected = int(tie * len(row)) if coin < epsilon else greedy(row, tie)
+    assert epsilon_greedy(row, epsilon, coin, tie) == expected
 
 
 @pytest.mark.parametrize("actions", [1, 2, 3, 4, 7])
 def test_exploration_spreads_over_all_actions_evenly(actions):
     ties = (np.arange(5 * actions) + 0.5) / (5 * actions)
-    chosen = [choose(np.arange(float(actions)), 1.0, 0.5, tie) for tie in ties]
+    chosen = [epsilon_greedy(np.arange(float(actions)), 1.0, 0.5, tie) for tie in ties]
     assert chosen == np.repeat(np.arange(actions), 5).tolist()
 
 
 @given(amounts, amounts, amounts, unit)
 def test_the_update_moves_by_the_rate_towards_the_target(old, reward, next_value, rate):
     expected = (1 - rate) * old + rate * (reward + next_value)
-    assert learned(old, reward, next_value, rate) == pytest.approx(expected, abs=1e-9)
+    assert q_update(old, reward, next_value, rate) == pytest.approx(expected, abs=1e-9)
 
 
 @given(amounts, amounts, st.floats(0.05, 1), st.integers(1, 50))
 def test_repeated_updates_close_the_gap_geometrically(old, target, rate, updates):
     value = old
     for _ in range(updates):
-        value = learned(value, target, 0.0, rate)
+        value = q_update(value, target, 0.0, rate)
     assert value == pytest.approx(target + (1 - rate) ** updates * (old - target), abs=1e-9)

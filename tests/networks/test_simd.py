@@ -25,7 +25,7 @@ def fused(factor, other, total):
 
 @numba.njit(error_model="numpy")
 def one_by_one(left, right, out):
-    """The product by its definition, each sum in ascending order, rounded once a term."""
+    """The product by its definition, each sum in ascending order, rounded once per term."""
     for row in range(out.shape[0]):
         for column in range(out.shape[1]):
             out[row, column] = 0
@@ -43,14 +43,14 @@ def drawn(shape, precision, seed=0):
     depth=SIZES,
     columns=SIZES,
     precision=st.sampled_from(PRECISIONS),
-    flipped=st.booleans(),
+    transpose=st.booleans(),
 )
 def test_a_product_has_the_sums_of_its_definition_bit_for_bit(
-    rows, depth, columns, precision, flipped
+    rows, depth, columns, precision, transpose
 ):
     left, right = drawn((rows, depth), precision), drawn((depth, columns), precision, 1)
     out, expected = np.full((2, rows, columns), np.nan, precision)
-    multiply(left.T.copy() if flipped else left, flipped, right, out)
+    multiply(left.T.copy() if transpose else left, transpose, right, out)
     one_by_one(left, right, expected)
     assert np.array_equal(out, expected)
     exact = left.astype(np.float64) @ right.astype(np.float64)

@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from qbumpers.assistants import make_assistant
+from qbumpers.assistants import make_assistant, register_assistant
 from qbumpers.learners import QLearner, Schedule
 from qbumpers.simulation import make_condition
 from qbumpers.tasks import TabularTask, cliff_walking, make_task
 from qbumpers.values import TabularValues
+from tests.assistants.own_rules import TakeBackOptions, take_back
 
 BUMPERS = ("stochastic-q-bumpers", {"alpha": 0.7, "second": True})
 THRESHOLDS = ("local-q-thresholding", {"alpha": 0.0195, "second": True})
@@ -17,6 +18,12 @@ def on_the_cliff(assistant, *, episodes=12, **settings):
     return make_condition(
         cliff_walking(), make_assistant(name, **options), episodes=episodes, **settings
     )
+
+
+def taken_back(*, tolerance=1.5, **settings):
+    """On the cliff with a rule that undoes; it stays registered."""
+    register_assistant("take-back", TakeBackOptions, needs=("undo",))(take_back)
+    return on_the_cliff(("take-back", {"tolerance": tolerance}), **settings)
 
 
 def on_slippery_ice(**settings):
@@ -56,14 +63,12 @@ def in_a_random_world(**settings):
         epsilon=Schedule(0.9, 0.1, 0.5),
         learning_rate=Schedule(0.5, 0.2, 1.0),
         initial_value=1.5,
-        penalty=0.75,
     )
+    usual = {"learner": learner, "perception": "transition-disruption", "penalty": 0.75}
     return make_condition(
         task,
         make_assistant("stochastic-q-bumpers", alpha=0.6, v_min=-3.0, p_max=0.9, clip=False),
         values=values,
-        learner=learner,
-        perception="transition-disruption",
         episodes=30,
-        **settings,
+        **{**usual, **settings},
     )

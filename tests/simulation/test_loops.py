@@ -1,55 +1,108 @@
 """The compiled trial against the plain one, step by step."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from qbumpers.learners import PERCEPTIONS, QLearner
-from qbumpers.simulation import Script, Steps, record, run
+from qbumpers.assistants import registry
+from qbumpers.decisions import Step
+from qbumpers.learners import (
+    PERCEPTIONS,
+    ExpectedSarsa,
+    Motor,
+    Perception,
+    QLearner,
+    Sarsa,
+    Schedule,
+)
+from qbumpers.simulation import Script, record, run
 from qbumpers.tasks import cliff_walking
-from tests.reference_simulation import RULES, ReferenceTrial
+from tests.reference_simulation import ReferenceTrial, plain_rule
 from tests.simulation.conditions import (
     BUMPERS,
     THRESHOLDS,
     in_a_random_world,
     on_slippery_ice,
     on_the_cliff,
+    taken_back,
 )
 
+CLUMSY = Motor(slip=0.15, lag=0.25)
+SOMETIMES = Perception(0.3, "executed", 2.0)
+BUDGET = ("budget", {"of": {"name": BUMPERS[0], **BUMPERS[1]}, "per_episode": 3})
+WANDERING = Schedule(0.6, 0.2, 0.5)
+
 CONDITIONS = {
-    "cliff, none": on_the_cliff(("none", {})),
-    "cliff, maximal": on_the_cliff(("maximal", {})),
-    "cliff, thresholds": on_the_cliff(THRESHOLDS),
+    "cliff, none": lambda: on_the_cliff(("none", {})),
+    "cliff, maximal": lambda: on_the_cliff(("maximal", {})),
+    "cliff, thresholds": lambda: on_the_cliff(THRESHOLDS),
     **{
-        f"cliff, bumpers, {name}": on_the_cliff(
-            BUMPERS, perception=name, learner=QLearner(penalty=7.5)
+        f"cliff, bumpers, {name}": lambda name=name: on_the_cliff(
+            BUMPERS, perception=name, penalty=7.5
         )
         for name in PERCEPTIONS
     },
-    "slippery ice": on_slippery_ice(),
-    "random world": in_a_random_world(),
-    "cliff, alone afterwards": on_the_cliff(BUMPERS, retention=7),
-    "slippery ice, alone afterwards, common": on_slippery_ice(
+    "slippery ice": on_slippery_ice,
+    "random world": in_a_random_world,
+    "cliff, alone afterwards": lambda: on_the_cliff(BUMPERS, retention=7),
+    "slippery ice, alone afterwards, common": lambda: on_slippery_ice(
         retention=9, common_random_numbers=True
     ),
-    "random world, alone afterwards": in_a_random_world(retention=11),
-    "random world, common": in_a_random_world(common_random_numbers=True),
-    "cliff, common, a single episode": on_the_cliff(
+    "random world, alone afterwards": lambda: in_a_random_world(retention=11),
+    "random world, common": lambda: in_a_random_world(common_random_numbers=True),
+    "cliff, common, a single episode": lambda: on_the_cliff(
         BUMPERS, episodes=1, common_random_numbers=True
+    ),
+    "cliff, sometimes noticed": lambda: on_the_cliff(BUMPERS, perception=SOMETIMES),
+    "random world, sometimes noticed": lambda: in_a_random_world(
+        perception=Perception(0.7, "nothing")
+    ),
+    "cliff, sarsa": lambda: on_the_cliff(BUMPERS, learner=Sarsa(epsilon=WANDERING)),
+    "cliff, sarsa, interrupted": lambda: on_the_cliff(
+        BUMPERS, learner=Sarsa(epsilon=WANDERING), perception="interruption", retention=3
+    ),
+    "random world, sarsa, common": lambda: in_a_random_world(
+        learner=Sarsa(0.8, WANDERING, initial_value=1.5), common_random_numbers=True
+    ),
+    "cliff, expected sarsa": lambda: on_the_cliff(BUMPERS, learner=ExpectedSarsa()),
+    "random world, expected sarsa": lambda: in_a_random_world(learner=ExpectedSarsa(0.8)),
+    "cliff, slip and lag": lambda: on_the_cliff(BUMPERS, motor=CLUMSY),
+    "random world, slip": lambda: in_a_random_world(motor=Motor(slip=0.2)),
+    "cliff, lag, sometimes noticed": lambda: on_the_cliff(
+        BUMPERS, motor=Motor(lag=0.2), perception=SOMETIMES, retention=3
+    ),
+    "cliff, sarsa, slip and lag, forgetting": lambda: on_the_cliff(
+        BUMPERS, learner=Sarsa(epsilon=WANDERING), motor=CLUMSY, forgetting=0.1
+    ),
+    "random world, forgetting": lambda: in_a_random_world(forgetting=0.3, retention=5),
+    "cliff, budget": lambda: on_the_cliff(BUDGET),
+    **{
+        f"cliff, taken back, {name}": lambda name=name: taken_back(perception=name, penalty=2.5)
+        for name in PERCEPTIONS
+    },
+    "cliff, taken back, sarsa, observant": lambda: taken_back(
+        learner=Sarsa(epsilon=WANDERING), perception="observant"
+    ),
+    "cliff, taken back, sarsa, sometimes": lambda: taken_back(
+        learner=Sarsa(epsilon=WANDERING), perception=SOMETIMES
     ),
 }
 SEED, TRIALS = 11, range(2, 5)
 
 
 def plain_trial(condition, trial, seed=SEED):
-    rule = partial(RULES[condition.assistant.name], **condition.assistant.options._asdict())
-    return ReferenceTrial(condition, rule, seed=seed, trial=trial).run()
+    assistant = condition.assistant
+    rule = plain_rule(assistant.name, **assistant.described())
+    return ReferenceTrial(
+        condition, rule.decide, seed=seed, trial=trial, observe=rule.observe
+    ).run()
 
 
 @pytest.fixture(scope="module", params=CONDITIONS)
 def condition(request):
-    return CONDITIONS[request.param]
+    with pytest.MonkeyPatch.context() as patch:  # own rules are forgotten afterwards
+        for name in ("_rules", "_rules_by_options"):
+            patch.setattr(registry, name, dict(getattr(registry, name)))
+        yield CONDITIONS[request.param]()
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +113,7 @@ def plain_trials(condition):
 def test_every_assisted_step_is_the_plain_simulations(condition, plain_trials):
     for trial, plain in zip(TRIALS, plain_trials, strict=True):
         found = record(condition, trial=trial, seed=SEED)
-        for field in Steps._fields:
+        for field in Step._fields:
             expected = np.array([getattr(step, field) for step in plain.steps])
             # Two ways to write the logistic differ by a few units in the last place.
             tolerance = 1e-12 if field == "probability" else 0.0
@@ -97,6 +150,15 @@ def test_the_conditions_compared_reach_every_kind_of_step(plain_trials, conditio
         alone = [step for step in steps if step.episode >= condition.episodes]
         assert {step.probability for step in alone} == {0.0}
         assert len({step.credited for step in alone}) > 1
+    if condition.assistant.name == "budget":
+        overrides = [episode["assisted_overrides"] for episode in episodes]
+        assert max(overrides) == condition.assistant.options.per_episode > min(overrides)
+    if condition.assistant.name == "take-back":
+        assert 0 < sum(step.undone for step in steps) == overridden
+    if condition.assistant.name != "none" and condition.perceived().notices == 0.3:
+        credited = [step.credited == step.executed for step in steps if step.overridden]
+        undone = any(step.undone for step in steps)
+        assert undone or 0.1 < sum(credited) / len(credited) < 0.5
     lengths = {episode["assisted_length"] for episode in episodes}
     assert min(lengths) < condition.task.episode_limit or condition.episodes == 1
 
@@ -105,7 +167,7 @@ def test_a_script_of_a_deterministic_task_repeats_its_trial():
     condition = on_the_cliff(BUMPERS)
     first = record(condition, trial=3, seed=SEED)
     again = record(condition, script=Script(first.proposed, first.coin, first.tie))
-    for field in Steps._fields:
+    for field in Step._fields:
         assert np.array_equal(getattr(again, field), getattr(first, field)), field
 
 
@@ -124,7 +186,7 @@ def test_a_step_leads_to_where_the_next_one_begins_and_tells_how_it_ended():
     same = found.episode[1:] == found.episode[:-1]
     assert (found.next_state[:-1][same] == found.state[1:][same]).all()
     assert (found.state[1:][~same] == 36).all()
-    terminated, success, crash = ((found.events & bit) > 0 for bit in (1, 2, 4))
+    terminated, success, crash, limit = ((found.events & bit) > 0 for bit in (1, 2, 4, 16))
     arrived = (found.executed == 2) & (found.state == 35)  # down, from above the goal
     assert np.array_equal(terminated, arrived)
     assert np.array_equal(success, arrived)
@@ -135,3 +197,5 @@ def test_a_step_leads_to_where_the_next_one_begins_and_tells_how_it_ended():
     last = np.append(~same, True)
     lengths = np.bincount(found.episode)
     assert (terminated[last] | (lengths == cliff_walking().episode_limit)).all()
+    assert np.array_equal(limit, last & ~terminated)
+    assert limit.any()

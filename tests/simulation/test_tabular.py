@@ -114,7 +114,8 @@ def test_an_episode_limit_stops_an_episode_that_never_ends():
     outcomes = simulate(task, "none", episodes=3, trials=2).outcomes
     assert (outcomes.assisted_length == 17).all()
     assert (outcomes.assisted_return == 17.0).all()  # undiscounted, as documented
-    assert (outcomes.assisted_events == 0).all()
+    assert (outcomes.assisted_events == 16).all()  # the limit, and nothing else
+    assert (outcomes.unassisted_events == 16).all()
 
 
 def test_the_learner_has_the_tasks_discount_unless_told_otherwise():

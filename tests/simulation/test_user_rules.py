@@ -110,7 +110,7 @@ def test_memory_lasts_a_trial_and_is_fresh_in_the_next():
 
 
 def test_a_memory_that_numba_cannot_compile_is_carried_too():
-    def whole_budget(options):
+    def whole_budget(options, model):
         return {"left": options.budget}
 
     def count_down(memory, step, options):

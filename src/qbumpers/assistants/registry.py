@@ -97,7 +97,9 @@ class Assistant:
 
     def __reduce__(self) -> Any:
         """Pickle by name, so that the rule is the one registered where it is unpickled."""
-        return _unpickled, (self.rule.name, self.options._asdict(), self.numbers)
+        own = self.numbers._replace(of=None) if self.of else self.numbers
+        # A tuple: the class of a user's options is another wherever the rule is registered.
+        return _unpickled, (self.rule.name, self.options._asdict(), tuple(own))
 
     @property
     def name(self) -> str:
@@ -349,7 +351,7 @@ def _compile_for(kind: str, decide: Any, start: Any, observe: Any, options_type:
     try:
         decided = result_type(decide, *arguments)
     except CompilationError as error:
-        if "unpack" in str(error):
+        if "wrong tuple length" in str(error) and f"got {len(Situation._fields)}" in str(error):
             raise RequestError(_BY_POSITION) from error
         raise
     if getattr(decided, "instance_class", None) is not Decision:
@@ -422,13 +424,14 @@ def assistant_of(given: Any, where: str) -> Assistant:
     )
 
 
-def _unpickled(name: str, options: dict[str, Any], numbers: Any) -> Assistant:
+def _unpickled(name: str, options: dict[str, Any], numbers: tuple[Any, ...]) -> Assistant:
     """An assistant where it arrives; its files are not read again."""
     if name not in _rules:
         raise unknown_name("assistant", name, _rules)
     rule = _rules[name]
     made = Assistant(rule, rule.options_type(**options))
-    made.__dict__["numbers"] = rule.options_type(*numbers)
+    again: Any = rule.options_type(*numbers)
+    made.__dict__["numbers"] = again._replace(of=made.of.numbers) if made.of else again
     return made
 
 

@@ -2,9 +2,9 @@
 
 Q-learning takes maxima of noisy values and sees few states off the expert's path, so its values are
 too high before crashes and other states that it seldom saw. Here states are gathered from learners
-and from the expert with random actions, an action is tried in each, the expert's greedy policy plays
-on to the end, and a correction of each state is fitted to the discounted returns (fitted evaluation by Monte
-Carlo).
+and from the expert with random actions, an action is tried in each, the expert's greedy policy
+plays on to the end, and a correction of each state is fitted to the discounted returns (fitted
+evaluation by Monte Carlo).
 """
 
 from collections.abc import Callable
@@ -180,7 +180,8 @@ def fit_correction(values: NetworkValues, samples: Samples, seed: int) -> Networ
         seed: of the fit.
 
     Returns:
-        The corrected values: one network that holds the given one and the correction side by side.
+        The corrected values: one network that holds the given one and the correction side by side,
+        without further values, which would need its shape.
     """
     claimed = values(samples.observations)[np.arange(len(samples.actions)), samples.actions]
     missing = samples.returns - claimed
@@ -198,7 +199,7 @@ def fit_correction(values: NetworkValues, samples: Samples, seed: int) -> Networ
     own = named_parameters(values.layout, values.parameters)
     _merge(own, correction, named_parameters(network.layout(values.inputs, values.actions), merged))
     words = f"{values.method}; each state corrected by {len(samples.actions)} returns, seed {seed}"
-    return replace(values, network=network, parameters=merged, method=words)
+    return replace(values, network=network, parameters=merged, method=words, others={})
 
 
 def _regress(

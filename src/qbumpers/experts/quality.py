@@ -105,12 +105,12 @@ def check_values(
         seed: of the random numbers, not negative.
 
     Returns:
-        A row per state and action that is compared: policy, episode, time (of the step, from 0), before_crash (steps until that
-        episode crashed, 1 for the step that did; null if it did not), distance (of the
-        observation from the nearest one of greedy episodes, in standard deviations of visited
-        observations), at_random (whether the state was picked so), value (claimed) and achieved
-        (null if truncation hides it). In each episode four states at random and those of
-        `BEFORE_CRASH`, in greedy ones all.
+        A row per state and action compared: policy, episode, time (of the step, from 0),
+        before_crash (steps until that episode crashed, 1 for the step that did; null if it did
+        not), distance (of the observation from the nearest one of greedy episodes, in standard
+        deviations of visited observations), at_random (whether the state was picked so), value
+        (claimed) and achieved (null if truncation hides it). In each episode four states at random
+        and those of `BEFORE_CRASH`, in greedy ones all.
 
     Raises:
         RequestError: if a number is out of range, or values or observations are wrong.
@@ -236,8 +236,8 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
         edges: float [B + 1], ascending; a bin holds its lower edge but not its upper one.
 
     Returns:
-        A row per bin that is not empty: low, high (its edges), value, achieved, bias and error (means
-        over episodes, and the standard error of the bias), episodes.
+        A row per bin that is not empty: low, high (its edges), value, achieved, bias and error
+        (means over episodes, and the standard error of the bias), episodes.
     """
     known = comparisons.drop_nulls(["achieved", column])
     rows = []

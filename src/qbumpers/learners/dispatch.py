@@ -21,6 +21,11 @@ def start(settings: Any, shape: Shape, stream: np.ndarray) -> Any:
     return uncompiled(learner_for_settings(type(settings)).start)(settings, shape, stream)
 
 
+def fresh_memory(share: float | None, settings: Any, shape: Shape, stream: np.ndarray) -> Any:
+    """A learner's first memory once more, if anything is to be forgotten; 0 if `share` is None."""
+    return 0 if share is None else start(settings, shape, stream.copy())
+
+
 def begin(settings: Any, memory: Any, episode: int, episodes: int) -> Any:
     """The rates of an episode; 0 of a learner without any."""
     function = learner_for_settings(type(settings)).begin
@@ -76,6 +81,14 @@ def _fade(table: np.ndarray, origin: np.ndarray, share: float) -> None:
 def _compiled_start(settings: Any, shape: Any, stream: Any) -> Any:
     function = learner_for_settings(settings.instance_class).start
     return lambda settings, shape, stream: function(settings, shape, stream)
+
+
+@overload(fresh_memory, strict=False, jit_options=INLINE)
+def _compiled_fresh_memory(share: Any, settings: Any, shape: Any, stream: Any) -> Any:
+    # Numba prunes `share is None` only if it is so: what is returned else has another type.
+    if isinstance(share, types.NoneType):
+        return lambda share, settings, shape, stream: 0
+    return lambda share, settings, shape, stream: start(settings, shape, stream.copy())
 
 
 @overload(begin, strict=False, jit_options=INLINE)

@@ -104,8 +104,8 @@ def make_memory(
         moments=np.zeros((2, size), precision),
         replay=np.zeros((settings.replay_size, 2 * layout.sizes[0] + 3), np.float32),
         counts=np.zeros(2, np.int64),
-        batch_workspace=np.zeros(4 * layout.room(settings.batch_size), precision),
-        workspace=np.zeros(layout.room(1), precision),
+        batch_workspace=np.zeros(4 * layout.workspace(settings.batch_size), precision),
+        workspace=np.zeros(layout.workspace(1), precision),
     )
 
 
@@ -125,7 +125,7 @@ def choose(
     settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, rates: Rates, stream: np.ndarray
 ) -> int:
     """An epsilon-greedy action."""
-    values = _values(memory, state)
+    values = values_of(memory.layout, memory.parameters, memory.workspace, state)
     return epsilon_greedy(values, rates.epsilon, draw(stream), draw(stream))
 
 
@@ -134,18 +134,14 @@ def policy(
     settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, rates: Rates, out: np.ndarray
 ) -> None:
     """The probabilities of `choose`."""
-    epsilon_greedy_policy(_values(memory, state), rates.epsilon, out)
+    values = values_of(memory.layout, memory.parameters, memory.workspace, state)
+    epsilon_greedy_policy(values, rates.epsilon, out)
 
 
 @compiled_apart
 def prefer(settings: DoubleDQN, memory: DQNMemory, state: np.ndarray, tie: float) -> int:
     """A greedy action."""
-    return greedy(_values(memory, state), tie)
-
-
-@compiled
-def _values(memory: DQNMemory, observation: np.ndarray) -> np.ndarray:
-    return values_of(memory.layout, memory.parameters, memory.workspace, observation)
+    return greedy(values_of(memory.layout, memory.parameters, memory.workspace, state), tie)
 
 
 @compiled_apart
@@ -191,7 +187,8 @@ def replay(settings: DoubleDQN, memory: DQNMemory, stream: np.ndarray) -> None:
         batch[n] = int(draw(stream) * among)
     update(settings, memory, batch)
     if seen % settings.target_every == 0:
-        memory.target[:] = memory.parameters
+        for i in range(len(memory.target)):
+            memory.target[i] = memory.parameters[i]
 
 
 @compiled_apart

@@ -1,7 +1,7 @@
 """One layer of a network in compiled code: its sums, its activation, and the way back.
 
-A batch of N states is a matrix with a row a state. Weights are [inputs, outputs], in a flat array
-of parameters that begins with them at `place` and goes on with the biases [outputs].
+A batch of N states is a matrix with a row per state. Weights are [inputs, outputs], in a flat array
+of parameters that begins with them at `offset` and goes on with the biases [outputs].
 """
 
 import numpy as np
@@ -18,19 +18,19 @@ def matrix(numbers: np.ndarray, first: int, rows: int, columns: int) -> np.ndarr
 
 @compiled_apart
 def weighted_sums(
-    parameters: np.ndarray, place: int, below: np.ndarray, above: np.ndarray
+    parameters: np.ndarray, offset: int, below: np.ndarray, above: np.ndarray
 ) -> np.ndarray:
     """Weights times the units below, into `above` [N, outputs]; returns the biases, to be added."""
     inputs, outputs = below.shape[1], above.shape[1]
-    end = place + outputs * inputs
-    weights = matrix(parameters, place, inputs, outputs)
+    end = offset + outputs * inputs
+    weights = matrix(parameters, offset, inputs, outputs)
     multiply(below, False, weights, above)
     return parameters[end : end + outputs]
 
 
 @compiled
 def add_biases(sums: np.ndarray, bias: np.ndarray) -> None:
-    """Add biases [outputs] to sums [N, outputs], in place."""
+    """Add biases [outputs] to sums [N, outputs], in offset."""
     for n in range(sums.shape[0]):
         for i in range(sums.shape[1]):
             sums[n, i] += bias[i]
@@ -38,7 +38,7 @@ def add_biases(sums: np.ndarray, bias: np.ndarray) -> None:
 
 @compiled_apart
 def activate(units: np.ndarray, bias: np.ndarray, relu: bool) -> None:
-    """Add biases to sums [N, units] and apply the activation, in place."""
+    """Add biases to sums [N, units] and apply the activation, in offset."""
     kind = units.dtype.type
     if relu:
         for n in range(units.shape[0]):
@@ -75,7 +75,7 @@ def activate(units: np.ndarray, bias: np.ndarray, relu: bool) -> None:
 
 
 @compiled_apart
-def derive(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
+def activation_gradient(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
     """Multiply deltas [N, units] by the derivative of the activation at its results `units`."""
     kind = units.dtype.type
     for n in range(units.shape[0]):
@@ -89,21 +89,21 @@ def derive(deltas: np.ndarray, units: np.ndarray, relu: bool) -> None:
 
 @compiled_apart
 def gradient_of_layer(
-    gradient: np.ndarray, place: int, below: np.ndarray, deltas: np.ndarray
+    gradient: np.ndarray, offset: int, below: np.ndarray, deltas: np.ndarray
 ) -> None:
     """Write the gradient of a layer from the units below it and the deltas above it."""
     inputs, outputs = below.shape[1], deltas.shape[1]
-    end = place + outputs * inputs
-    multiply(below, True, deltas, matrix(gradient, place, inputs, outputs))
+    end = offset + outputs * inputs
+    multiply(below, True, deltas, matrix(gradient, offset, inputs, outputs))
     column_sums(deltas, gradient[end : end + outputs])
 
 
 @compiled_apart
-def pass_down(
-    parameters: np.ndarray, place: int, deltas: np.ndarray, units: np.ndarray, relu: bool,
+def backpropagate(
+    parameters: np.ndarray, offset: int, deltas: np.ndarray, units: np.ndarray, relu: bool,
     below: np.ndarray,
 ) -> None:  # fmt: skip
-    """Deltas of the layer below, into `below` [N, inputs], whose results were `units`."""
-    weights = matrix(parameters, place, units.shape[1], deltas.shape[1])
+    """Deltas of the layer below, into `below` [N, inputs]; `units` are that layer's results."""
+    weights = matrix(parameters, offset, units.shape[1], deltas.shape[1])
     multiply(deltas, False, transposed(weights), below)
-    derive(below, units, relu)
+    activation_gradient(below, units, relu)

@@ -13,11 +13,11 @@ from pydantic import Field
 from qbumpers.compilation import compiled, compiled_apart
 from qbumpers.networks.layers import (
     activate,
+    activation_gradient,
     add_biases,
-    derive,
+    backpropagate,
     gradient_of_layer,
     matrix,
-    pass_down,
     weighted_sums,
 )
 from qbumpers.networks.simd import multiply, transposed
@@ -75,7 +75,7 @@ class Layout(NamedTuple):
         """How many numbers the network has."""
         return sum(outputs * (inputs + 1) for _, outputs, inputs in self.layers())
 
-    def room(self, states: int) -> int:
+    def workspace(self, states: int) -> int:
         """How many numbers `forward` needs for a batch of states."""
         heads = 2 * self.dueling + 1 + self.actions if self.dueling else self.actions
         return states * (sum(self.sizes) + heads)
@@ -91,12 +91,12 @@ def named_parameters(layout: Layout, parameters: np.ndarray) -> dict[str, np.nda
     Returns:
         Views of `parameters`.
     """
-    named, place = {}, 0
+    named, offset = {}, 0
     for name, outputs, inputs in layout.layers():
-        end = place + outputs * inputs
-        named[f"{name}.weight"] = parameters[place:end].reshape(inputs, outputs)
+        end = offset + outputs * inputs
+        named[f"{name}.weight"] = parameters[offset:end].reshape(inputs, outputs)
         named[f"{name}.bias"] = parameters[end : end + outputs]
-        place = end + outputs
+        offset = end + outputs
     return named
 
 
@@ -108,57 +108,59 @@ def initialise(layout: Layout, parameters: np.ndarray, stream: np.ndarray) -> No
         parameters: float [P], overwritten.
         stream: uint64 [4], see `qbumpers.random_streams`.
     """
-    place = 0
+    offset = 0
     for _, outputs, inputs in layout.layers():
-        _spread(parameters[place : place + outputs * inputs], outputs + inputs, stream)
-        place += outputs * inputs
-        parameters[place : place + outputs] = 0
-        place += outputs
+        _glorot_uniform(parameters[offset : offset + outputs * inputs], outputs + inputs, stream)
+        offset += outputs * inputs
+        parameters[offset : offset + outputs] = 0
+        offset += outputs
 
 
 @compiled_apart
-def _spread(weights: np.ndarray, connections: int, stream: np.ndarray) -> None:
+def _glorot_uniform(weights: np.ndarray, connections: int, stream: np.ndarray) -> None:
     limit = np.sqrt(6 / connections)
     for i in range(len(weights)):
         weights[i] = limit * (2 * draw(stream) - 1)
 
 
 @compiled_apart
-def forward(layout: Layout, parameters: np.ndarray, room: np.ndarray, states: int) -> np.ndarray:
+def forward(
+    layout: Layout, parameters: np.ndarray, workspace: np.ndarray, states: int
+) -> np.ndarray:
     """Action values of a batch of states.
 
     Args:
         layout: of the network.
         parameters: float [P].
-        room: float [`layout.room(states)` or more]; its first numbers are the observations
-            [states, inputs], what follows is overwritten, for `backward`.
+        workspace: float [`layout.workspace(states)` or more]; its first numbers are the
+            observations [states, inputs], what follows is overwritten, for `backward`.
         states: N.
 
     Returns:
-        float [N, A], a view of `room`.
+        float [N, A], a view of `workspace`.
     """
     sizes, actions, streams, relu = layout
-    place, first = 0, 0
-    below = matrix(room, 0, states, sizes[0])
+    offset, first = 0, 0
+    below = matrix(workspace, 0, states, sizes[0])
     for layer in range(1, len(sizes)):
         first += below.size
-        units = matrix(room, first, states, sizes[layer])
-        activate(units, weighted_sums(parameters, place, below, units), relu)
-        place += units.shape[1] * (below.shape[1] + 1)
+        units = matrix(workspace, first, states, sizes[layer])
+        activate(units, weighted_sums(parameters, offset, below, units), relu)
+        offset += units.shape[1] * (below.shape[1] + 1)
         below = units
     first += below.size
     if streams == 0:
-        values = matrix(room, first, states, actions)
-        add_biases(values, weighted_sums(parameters, place, below, values))
+        values = matrix(workspace, first, states, actions)
+        add_biases(values, weighted_sums(parameters, offset, below, values))
         return values
-    value_units, value, advantage_units, values = _heads(room, first, states, streams, actions)
-    activate(value_units, weighted_sums(parameters, place, below, value_units), relu)
-    place += streams * (below.shape[1] + 1)
-    add_biases(value, weighted_sums(parameters, place, value_units, value))
-    place += streams + 1
-    activate(advantage_units, weighted_sums(parameters, place, below, advantage_units), relu)
-    place += streams * (below.shape[1] + 1)
-    add_biases(values, weighted_sums(parameters, place, advantage_units, values))
+    value_units, value, advantage_units, values = _heads(workspace, first, states, streams, actions)
+    activate(value_units, weighted_sums(parameters, offset, below, value_units), relu)
+    offset += streams * (below.shape[1] + 1)
+    add_biases(value, weighted_sums(parameters, offset, value_units, value))
+    offset += streams + 1
+    activate(advantage_units, weighted_sums(parameters, offset, below, advantage_units), relu)
+    offset += streams * (below.shape[1] + 1)
+    add_biases(values, weighted_sums(parameters, offset, advantage_units, values))
     for n in range(states):
         mean = values[n].sum() / values.dtype.type(actions)
         for action in range(actions):
@@ -175,7 +177,7 @@ def values_of(
     Args:
         layout: of the network.
         parameters: float [P].
-        workspace: float [`layout.room(1)` or more], overwritten.
+        workspace: float [`layout.workspace(1)` or more], overwritten.
         observation: float32 [D].
 
     Returns:
@@ -187,93 +189,106 @@ def values_of(
 
 
 @compiled
-def _heads(room: np.ndarray, first: int, states: int, streams: int, actions: int) -> Any:
+def _heads(workspace: np.ndarray, first: int, states: int, streams: int, actions: int) -> Any:
     """Where the layers of a dueling network lie."""
     second = first + states * streams
     third = second + states
     fourth = third + states * streams
     return (
-        matrix(room, first, states, streams),
-        matrix(room, second, states, 1),
-        matrix(room, third, states, streams),
-        matrix(room, fourth, states, actions),
+        matrix(workspace, first, states, streams),
+        matrix(workspace, second, states, 1),
+        matrix(workspace, third, states, streams),
+        matrix(workspace, fourth, states, actions),
     )
 
 
 @compiled_apart
 def backward(
-    layout: Layout, parameters: np.ndarray, room: np.ndarray, deltas: np.ndarray,
-    spare: np.ndarray, gradient: np.ndarray,
+    layout: Layout, parameters: np.ndarray, workspace: np.ndarray, deltas: np.ndarray,
+    deltas_workspace: np.ndarray, gradient: np.ndarray,
 ) -> None:  # fmt: skip
     """The gradient of a loss, by back-propagation.
 
     Args:
         layout: of the network.
         parameters: float [P].
-        room: as `forward` left it.
+        workspace: as `forward` left it.
         deltas: float [N, A], derivatives of the loss by the action values.
-        spare: float [`layout.room(N)`], overwritten.
+        deltas_workspace: float [`layout.workspace(N)`], overwritten.
         gradient: float [P], overwritten.
     """
     sizes, _, streams, relu = layout
     states = deltas.shape[0]
-    first, place = 0, 0  # of the last hidden layer, and of the parameters after it
+    first, offset = 0, 0  # of the last hidden layer, and of the parameters after it
     for layer in range(1, len(sizes)):
         first += states * sizes[layer - 1]
-        place += sizes[layer] * (sizes[layer - 1] + 1)
+        offset += sizes[layer] * (sizes[layer - 1] + 1)
     last = sizes[len(sizes) - 1]
-    units = matrix(room, first, states, last)
-    below = matrix(spare, first, states, last)
+    units = matrix(workspace, first, states, last)
+    below = matrix(deltas_workspace, first, states, last)
     if streams == 0:
-        gradient_of_layer(gradient, place, units, deltas)
+        gradient_of_layer(gradient, offset, units, deltas)
         if len(sizes) > 1:
-            pass_down(parameters, place, deltas, units, relu, below)
+            backpropagate(parameters, offset, deltas, units, relu, below)
     else:
         _backward_heads(
-            layout, parameters, room, deltas, spare, gradient, place, first, units, below
+            layout,
+            parameters,
+            workspace,
+            deltas,
+            deltas_workspace,
+            gradient,
+            offset,
+            first,
+            units,
+            below,
         )
     for layer in range(len(sizes) - 1, 0, -1):
-        place -= sizes[layer] * (sizes[layer - 1] + 1)
+        offset -= sizes[layer] * (sizes[layer - 1] + 1)
         above = below
         first -= states * sizes[layer - 1]
-        units = matrix(room, first, states, sizes[layer - 1])
-        gradient_of_layer(gradient, place, units, above)
+        units = matrix(workspace, first, states, sizes[layer - 1])
+        gradient_of_layer(gradient, offset, units, above)
         if layer > 1:
-            below = matrix(spare, first, states, sizes[layer - 1])
-            pass_down(parameters, place, above, units, relu, below)
+            below = matrix(deltas_workspace, first, states, sizes[layer - 1])
+            backpropagate(parameters, offset, above, units, relu, below)
 
 
 @compiled_apart
 def _backward_heads(
-    layout, parameters, room, deltas, spare, gradient, place, first, units, below
-):  # fmt: skip
+    layout: Layout, parameters: np.ndarray, workspace: np.ndarray, deltas: np.ndarray,
+    deltas_workspace: np.ndarray, gradient: np.ndarray, offset: int, first: int,
+    units: np.ndarray, below: np.ndarray,
+) -> None:  # fmt: skip
     """The last four layers of a dueling network, down to the deltas `below` of its trunk."""
     sizes, actions, streams, relu = layout
     states, last = units.shape
     first += units.size
-    value_units, _, advantage_units, _ = _heads(room, first, states, streams, actions)
-    value_down, value, advantage_down, advantages = _heads(spare, first, states, streams, actions)
+    value_units, _, advantage_units, _ = _heads(workspace, first, states, streams, actions)
+    value_down, value, advantage_down, advantages = _heads(
+        deltas_workspace, first, states, streams, actions
+    )
     for n in range(states):
         total = deltas[n].sum()
         value[n, 0] = total
         for action in range(actions):
             advantages[n, action] = deltas[n, action] - total / deltas.dtype.type(actions)
-    value_place = place + streams * (last + 1)
-    advantage_place = value_place + streams + 1
-    advantages_place = advantage_place + streams * (last + 1)
-    gradient_of_layer(gradient, value_place, value_units, value)
-    pass_down(parameters, value_place, value, value_units, relu, value_down)
-    gradient_of_layer(gradient, place, units, value_down)
-    gradient_of_layer(gradient, advantages_place, advantage_units, advantages)
-    pass_down(parameters, advantages_place, advantages, advantage_units, relu, advantage_down)
-    gradient_of_layer(gradient, advantage_place, units, advantage_down)
+    value_offset = offset + streams * (last + 1)
+    advantage_offset = value_offset + streams + 1
+    advantages_offset = advantage_offset + streams * (last + 1)
+    gradient_of_layer(gradient, value_offset, value_units, value)
+    backpropagate(parameters, value_offset, value, value_units, relu, value_down)
+    gradient_of_layer(gradient, offset, units, value_down)
+    gradient_of_layer(gradient, advantages_offset, advantage_units, advantages)
+    backpropagate(parameters, advantages_offset, advantages, advantage_units, relu, advantage_down)
+    gradient_of_layer(gradient, advantage_offset, units, advantage_down)
     if len(sizes) > 1:
-        weights = matrix(parameters, place, last, streams)
+        weights = matrix(parameters, offset, last, streams)
         multiply(value_down, False, transposed(weights), below)
-        weights = matrix(parameters, advantage_place, last, streams)
+        weights = matrix(parameters, advantage_offset, last, streams)
         sums = np.empty_like(below)
         multiply(advantage_down, False, transposed(weights), sums)
         for n in range(states):
             for i in range(last):
                 below[n, i] += sums[n, i]
-        derive(below, units, relu)
+        activation_gradient(below, units, relu)

@@ -1,9 +1,9 @@
 """Products of small matrices in vector registers, with the same sums on every processor.
 
 A linear algebra library picks its code, and with it the order of its sums, by the processor; the
-rounding errors that differ grow until two learners of one seed are two people. Here every sum runs
-in one fixed order and every multiplication and addition is fused (rounded once), however wide the
-registers are. For matrices as small as a learner's that is also faster.
+rounding errors that differ grow until two learners of one seed have little in common. Here every
+sum runs in one fixed order and every multiplication and addition is fused (rounded once), however
+wide the registers are. For matrices as small as a learner's that is also faster.
 """
 
 from collections.abc import Callable
@@ -17,13 +17,13 @@ from numba.extending import intrinsic, models, register_model
 
 from qbumpers.compilation import compiled, compiled_apart
 
-WIDE, NARROW, ALONE = 32, 4, 1
-"""How many numbers are worked on together, where so many are left."""
+WIDE, NARROW, SCALAR = 32, 4, 1
+"""How many numbers are worked on together, if so many are left."""
 
 _ROWS = 8  # of a tile; its 8 times 32 sums fill the registers of a processor with AVX-512
 
 
-class Lanes(types.Type):
+class Vector(types.Type):
     """Numba's type of `width` floats that are worked on together.
 
     Args:
@@ -33,7 +33,7 @@ class Lanes(types.Type):
 
     def __init__(self, number: Any, width: int) -> None:
         self.number, self.width = number, width
-        super().__init__(f"Lanes({number}, {width})")
+        super().__init__(f"Vector({number}, {width})")
 
     @property
     def key(self) -> tuple[Any, int]:
@@ -41,30 +41,30 @@ class Lanes(types.Type):
         return self.number, self.width
 
 
-@register_model(Lanes)
-class _LanesModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, lanes: Lanes) -> None:
-        number = manager.lookup(lanes.number).get_value_type()
-        super().__init__(manager, lanes, ir.VectorType(number, lanes.width))
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, vector: Vector) -> None:
+        number = manager.lookup(vector.number).get_value_type()
+        super().__init__(manager, vector, ir.VectorType(number, vector.width))
 
 
-def _in_place(build: Callable[..., Any]) -> Callable[..., Any]:
+def _instructions(build: Callable[..., Any]) -> Callable[..., Any]:
     """A function whose calls become a few instructions, built from the types of its arguments."""
     return intrinsic(prefer_literal=True)(build)
 
 
-@_in_place
+@_instructions
 def zeros(typing: Any, numbers: Any, width: Any) -> Any:
     """So many zeros of an array's kind of number: `zeros(array, 4)`."""
-    lanes = Lanes(numbers.dtype, width.literal_value)
+    vector = Vector(numbers.dtype, width.literal_value)
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return ir.Constant(context.get_value_type(lanes), None)
+        return ir.Constant(context.get_value_type(vector), None)
 
-    return lanes(numbers, width), build
+    return vector(numbers, width), build
 
 
-@_in_place
+@_instructions
 def load(typing: Any, numbers: Any, at: Any, like: Any) -> Any:
     """Numbers of a contiguous array from a place on, as many as `like` has."""
 
@@ -75,48 +75,48 @@ def load(typing: Any, numbers: Any, at: Any, like: Any) -> Any:
     return like(numbers, types.intp, like), build
 
 
-@_in_place
-def store(typing: Any, numbers: Any, at: Any, lanes: Any) -> Any:
-    """Write lanes into a contiguous array from a place on."""
+@_instructions
+def store(typing: Any, numbers: Any, at: Any, vector: Any) -> Any:
+    """Write a vector into a contiguous array from a place on."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        pointer = _pointer(context, builder, numbers, arguments, lanes)
+        pointer = _pointer(context, builder, numbers, arguments, vector)
         builder.store(arguments[2], pointer, align=numbers.dtype.bitwidth // 8)
         return context.get_dummy_value()
 
-    return types.void(numbers, types.intp, lanes), build
+    return types.void(numbers, types.intp, vector), build
 
 
-def _pointer(context: Any, builder: Any, kind: Any, arguments: Any, lanes: Any) -> Any:
+def _pointer(context: Any, builder: Any, kind: Any, arguments: Any, vector: Any) -> Any:
     data = context.make_array(kind)(context, builder, arguments[0]).data
     place = builder.gep(data, [arguments[1]])
-    return builder.bitcast(place, context.get_value_type(lanes).as_pointer())
+    return builder.bitcast(place, context.get_value_type(vector).as_pointer())
 
 
-@_in_place
+@_instructions
 def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
-    """`factor` times `other` plus `total`, rounded once; each a number or, like `total`, lanes."""
-    number = total.number if isinstance(total, Lanes) else total
+    """`factor` times `other` plus `total`, rounded once; each a number or a vector like `total`."""
+    number = total.number if isinstance(total, Vector) else total
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         kind = arguments[2].type
-        repeated = [_repeated(builder, value, kind) for value in arguments]
+        splats = [_splat(builder, value, kind) for value in arguments]
         suffix = f"f{number.bitwidth}"
-        if isinstance(total, Lanes):
+        if isinstance(total, Vector):
             suffix = f"v{total.width}{suffix}"
         fused = get_or_insert_function(
             builder.module, ir.FunctionType(kind, [kind] * 3), f"llvm.fma.{suffix}"
         )
-        return builder.call(fused, repeated)
+        return builder.call(fused, splats)
 
     def suited(given: Any) -> Any:
-        return given if isinstance(given, Lanes) else number
+        return given if isinstance(given, Vector) else number
 
     return total(suited(factor), suited(other), total), build
 
 
-def _repeated(builder: Any, value: Any, kind: Any) -> Any:
-    """A number in every lane; a value that has the kind already is left as it is."""
+def _splat(builder: Any, value: Any, kind: Any) -> Any:
+    """A number in every lane of a vector; a value that has the kind already is left as it is."""
     if value.type == kind:
         return value
     nothing = ir.Constant(kind, ir.Undefined)
@@ -127,46 +127,48 @@ def _repeated(builder: Any, value: Any, kind: Any) -> Any:
 
 
 @compiled_apart
-def multiply(left: np.ndarray, flipped: bool, right: np.ndarray, out: np.ndarray) -> None:
+def multiply(left: np.ndarray, transpose: bool, right: np.ndarray, out: np.ndarray) -> None:
     """Product of two contiguous matrices of equal kind, each of its sums in ascending order.
 
     Args:
-        left: float [rows, depth], or [depth, rows] where it is `flipped`.
-        flipped: whether the left matrix is taken transposed.
+        left: float [rows, depth], or [depth, rows] if `transpose`.
+        transpose: whether the left matrix is taken transposed.
         right: float [depth, columns].
         out: float [rows, columns], overwritten.
     """
     columns, column = right.shape[1], 0
     while column + WIDE <= columns:
-        _strip(left, flipped, right, out, column, zeros(right, WIDE))
+        _panel(left, transpose, right, out, column, zeros(right, WIDE))
         column += WIDE
     while column + NARROW <= columns:
-        _strip(left, flipped, right, out, column, zeros(right, NARROW))
+        _panel(left, transpose, right, out, column, zeros(right, NARROW))
         column += NARROW
     while column < columns:
-        _strip(left, flipped, right, out, column, zeros(right, ALONE))
-        column += ALONE
+        _panel(left, transpose, right, out, column, zeros(right, SCALAR))
+        column += SCALAR
 
 
 @compiled
-def _strip(left, flipped, right, out, column, zero):
+def _panel(
+    left: np.ndarray, transpose: bool, right: np.ndarray, out: np.ndarray, column: int, zero: Any
+) -> None:
     """As many columns of a product as `zero` has lanes, from `column` on."""
     depth, columns = right.shape
     rows, row, one = out.shape[0], 0, right.dtype.type(0)
-    down, along = (1, rows) if flipped else (depth, 1)
+    down, along = (1, rows) if transpose else (depth, 1)
     while row + _ROWS <= rows:
         a = b = c = d = e = f = g = h = zero
         for k in range(depth):
-            lanes = load(right, k * columns + column, zero)
+            vector = load(right, k * columns + column, zero)
             at = row * down + k * along
-            a = multiply_add(load(left, at, one), lanes, a)
-            b = multiply_add(load(left, at + down, one), lanes, b)
-            c = multiply_add(load(left, at + 2 * down, one), lanes, c)
-            d = multiply_add(load(left, at + 3 * down, one), lanes, d)
-            e = multiply_add(load(left, at + 4 * down, one), lanes, e)
-            f = multiply_add(load(left, at + 5 * down, one), lanes, f)
-            g = multiply_add(load(left, at + 6 * down, one), lanes, g)
-            h = multiply_add(load(left, at + 7 * down, one), lanes, h)
+            a = multiply_add(load(left, at, one), vector, a)
+            b = multiply_add(load(left, at + down, one), vector, b)
+            c = multiply_add(load(left, at + 2 * down, one), vector, c)
+            d = multiply_add(load(left, at + 3 * down, one), vector, d)
+            e = multiply_add(load(left, at + 4 * down, one), vector, e)
+            f = multiply_add(load(left, at + 5 * down, one), vector, f)
+            g = multiply_add(load(left, at + 6 * down, one), vector, g)
+            h = multiply_add(load(left, at + 7 * down, one), vector, h)
         at = row * columns + column
         store(out, at, a)
         store(out, at + columns, b)
@@ -180,8 +182,8 @@ def _strip(left, flipped, right, out, column, zero):
     while row < rows:
         total = zero
         for k in range(depth):
-            lanes = load(right, k * columns + column, zero)
-            total = multiply_add(load(left, row * down + k * along, one), lanes, total)
+            vector = load(right, k * columns + column, zero)
+            total = multiply_add(load(left, row * down + k * along, one), vector, total)
         store(out, row * columns + column, total)
         row += 1
 
@@ -196,15 +198,15 @@ def column_sums(numbers: np.ndarray, out: np.ndarray) -> None:
     """
     columns, column = numbers.shape[1], 0
     while column + WIDE <= columns:
-        _sums_of_strip(numbers, out, column, zeros(numbers, WIDE))
+        _sums_of_panel(numbers, out, column, zeros(numbers, WIDE))
         column += WIDE
     while column < columns:
-        _sums_of_strip(numbers, out, column, zeros(numbers, ALONE))
-        column += ALONE
+        _sums_of_panel(numbers, out, column, zeros(numbers, SCALAR))
+        column += SCALAR
 
 
 @compiled
-def _sums_of_strip(numbers, out, column, total):
+def _sums_of_panel(numbers: np.ndarray, out: np.ndarray, column: int, total: Any) -> None:
     """As many sums of columns as `total` has lanes, from `column` on."""
     rows, columns = numbers.shape
     one = numbers.dtype.type(1)
@@ -229,8 +231,8 @@ def sum_of_squares(numbers: np.ndarray) -> float:
     """Sum of the squares of an array [N], `WIDE` interleaved sums and then those in turn."""
     totals, place = zeros(numbers, WIDE), 0
     while place + WIDE <= len(numbers):
-        lanes = load(numbers, place, totals)
-        totals = multiply_add(lanes, lanes, totals)
+        vector = load(numbers, place, totals)
+        totals = multiply_add(vector, vector, totals)
         place += WIDE
     each = np.empty(WIDE, numbers.dtype)
     store(each, 0, totals)

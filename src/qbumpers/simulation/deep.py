@@ -307,7 +307,7 @@ def _assistance(condition: Condition) -> NetworkAssistance:
         layout=values.layout,
         parameters=values.parameters,
         others=further_parameters,
-        workspace=np.zeros(values.layout.room(1), np.float32),
+        workspace=np.zeros(values.layout.workspace(1), np.float32),
         row=np.zeros(actions),
         other_rows=np.zeros((len(others), actions)),
         discount=condition.discount,

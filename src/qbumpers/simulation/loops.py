@@ -24,7 +24,7 @@ from qbumpers.decisions import (
     step_of,
 )
 from qbumpers.learners.dispatch import begin as begin_learner
-from qbumpers.learners.dispatch import choose, forget, learn, prefer
+from qbumpers.learners.dispatch import choose, forget, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
 from qbumpers.learners.interface import Shape
 from qbumpers.learners.motor import move
@@ -263,14 +263,11 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
 
 
 @inlined
-def _forget(
-    forgetting: float | None, memory: Any, settings: Any, shape: Shape, stream: Any, episode: int
-) -> None:
-    """Move a memory towards a first one, between two episodes."""
+def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
+    """Move a memory towards what it was at first, between two episodes."""
     if forgetting is None:
         return
     if episode > 0:
-        fresh = start_learner(settings, shape, stream.copy())
         forget(memory, fresh, forgetting)
 
 
@@ -314,6 +311,7 @@ def run_trials(
     recorded = 0
     for trial in range(trials):
         _copy_streams(own, streams, trial, 0)
+        fresh = fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
         held = start_learner(learner.settings, shape, own_streams[LEARNER])
         memory = borrow(held)
         rule_memory = start_rule(assistance.options, model)
@@ -321,9 +319,7 @@ def run_trials(
             if episode > 0 and streams.shape[1] > 1:
                 _copy_streams(own, streams, trial, episode)
             when = When(trial, episode, episode < training)
-            _forget(
-                learner.forgetting, memory, learner.settings, shape, own_streams[LEARNER], episode
-            )  # fmt: skip
+            _forget(learner.forgetting, memory, fresh, episode)
             rates = begin_learner(learner.settings, memory, episode, training)
             rule_memory, recorded = _assisted_episode(
                 dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,

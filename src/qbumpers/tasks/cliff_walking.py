@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from qbumpers.tasks.display import made_by
 from qbumpers.tasks.displays.cliff_walking import ACTIONS, MAP, cliff_walking_display
-from qbumpers.tasks.drawing import picture
 from qbumpers.tasks.environment import TabularEnvironment
 from qbumpers.tasks.tabular import TabularTask
 
@@ -57,6 +57,7 @@ def cliff_walking() -> TabularTask:
         discount=1.0,
         episode_limit=EPISODE_LIMIT,
         grid=(ROWS, COLUMNS),
+        make_display=made_by(cliff_walking_display),
         **{field: array[:, :, None] for field, array in deterministic.items()},
     )
 
@@ -75,11 +76,7 @@ class CliffWalking(TabularEnvironment):
 
     def render(self) -> Any:
         """The current state: text for "ansi", uint8 [256, 768, 3] for "rgb_array"."""
-        if self.render_mode == "ansi":
-            return as_text(self._state)
-        if self.render_mode == "rgb_array":
-            return picture(cliff_walking_display(), self._state)
-        return None
+        return as_text(self._state) if self.render_mode == "ansi" else super().render()
 
 
 def as_text(state: int) -> str:

@@ -5,7 +5,10 @@ from typing import Any
 import gymnasium
 from gymnasium import spaces
 
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
+from qbumpers.tasks.display import unassisted_step
+from qbumpers.tasks.drawing import picture
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, transition
 from qbumpers.tasks.task import Task
 
@@ -24,7 +27,7 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         RequestError: if there is no such mode.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(self, task: Task, render_mode: str | None = None) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
@@ -36,6 +39,7 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         self.action_space = spaces.Discrete(task.actions)
         self._dynamics = task.dynamics()
         self._state = 0
+        self._last_step: Step | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -43,6 +47,7 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         """Start an episode in a state drawn from the task's start distribution."""
         super().reset(seed=seed)
         self._state = int(first_state(self._dynamics, self.np_random.random()))
+        self._last_step = None
         return self._state, {"success": False, "crash": False}
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
@@ -58,10 +63,18 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         if not 0 <= action < dynamics.actions:
             raise RequestError(f"action = {action!r}; it must lie in [0, {dynamics.actions})")
         index = transition(dynamics, self._state, int(action), self.np_random.random())
+        before, reward = self._state, float(dynamics.reward[index])
         self._state = int(dynamics.next_state[index])
+        self._last_step = unassisted_step(before, int(action), reward, self._state)
         events = int(dynamics.events[index])
         info = {"success": bool(events & SUCCESS), "crash": bool(events & CRASH)}
-        return self._state, float(dynamics.reward[index]), bool(events & TERMINATED), False, info
+        return self._state, reward, bool(events & TERMINATED), False, info
+
+    def render(self) -> Any:
+        """For "rgb_array" the picture of the state, uint8 [H, W, 3]; None without a mode."""
+        if self.render_mode != "rgb_array":
+            return None
+        return picture(self.task.display, self._state, self._last_step)
 
     def snapshot(self) -> int:
         """The number of the state."""

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
@@ -19,6 +19,9 @@ from qbumpers.tasks.construction import (
     outcomes_of_table,
     start_distribution,
 )
+from qbumpers.tasks.display import Display
+from qbumpers.tasks.displays.by_environment import display_maker
+from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
 from qbumpers.tasks.task import distance_between
@@ -114,9 +117,9 @@ class TabularTask:
         return distance_between(self.actions, self.action_distance)
 
     @property
-    def display(self) -> Any:
-        """How it is shown and played; None if it does not say."""
-        return None if self.make_display is None else self.make_display(self)
+    def display(self) -> Display:
+        """How it is shown and played; a plain one if it has none of its own."""
+        return plain_display(self) if self.make_display is None else self.make_display(self)
 
     def dynamics(self) -> Dynamics:
         """The task laid out for compiled loops."""
@@ -274,7 +277,8 @@ class TabularTask:
             RequestError: if the environment has no table, or no limit is known.
         """
         description = description_of(environment, episode_limit)
-        return cls.from_table(**description, discount=discount, success=success, crash=crash)
+        made = cls.from_table(**description, discount=discount, success=success, crash=crash)
+        return replace(made, make_display=display_maker(environment))
 
 
 def _cumulative(probability: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from gymnasium import spaces
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
 from qbumpers.tasks.checking import check_common
+from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.dynamics import Dynamics
 from qbumpers.tasks.stepping import GymnasiumStepper, Stepper, make_environment
 from qbumpers.tasks.task import distance_between
@@ -189,6 +190,7 @@ class VectorTask:
             has_success="success" in announced,
             has_crash="crash" in announced,
             undoable=undoable,
+            make_display=display_maker(environment),
         )
 
 

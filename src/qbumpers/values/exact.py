@@ -22,7 +22,7 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
     by the step limit plays no part.
 
     Args:
-        task: the task.
+        task: what is to be solved.
         discount: of the values, in (0, 1]; the task's if None.
 
     Returns:
@@ -78,8 +78,8 @@ def _policy_iteration(task: TabularTask, policy: np.ndarray, discount: float) ->
         if kept.all():
             return table
         policy = np.where(kept, policy, table.argmax(axis=1))
-        # Improving a proper policy makes one that never ends only where a cycle pays.
-        if discount == 1 and not _leading_to_the_end(task, _only(policy, task.actions))[0].all():
+        # Improving a proper policy makes one that never ends only if a cycle pays.
+        if discount == 1 and not _reaching_the_end(task, _one_hot(policy, task.actions))[0].all():
             raise RequestError(
                 f"task {task.name}: reward can be collected for ever, so its undiscounted values "
                 "do not exist; give a discount below 1"
@@ -118,11 +118,11 @@ def _undiscounted(task: TabularTask) -> np.ndarray:
     ended = task.terminated | ~proper[task.next_state] | ~proper[:, None, None]
     closed = replace(task, terminated=ended)
     allowed = np.ones((task.states, task.actions), np.bool_)
-    policy = _leading_to_the_end(closed, allowed)[1]
+    policy = _reaching_the_end(closed, allowed)[1]
     return np.where(proper[:, None], _policy_iteration(closed, policy, 1.0), 0.0)
 
 
-def _leading_to_the_end(task: TabularTask, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _reaching_the_end(task: TabularTask, allowed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States that can reach the end by allowed actions [S, A], and for each an action nearer it."""
     possible = (task.probability > 0) & allowed[:, :, None]
     ends = np.zeros(task.states, np.bool_)
@@ -136,7 +136,7 @@ def _leading_to_the_end(task: TabularTask, allowed: np.ndarray) -> tuple[np.ndar
         ends |= fresh
 
 
-def _only(policy: np.ndarray, actions: int) -> np.ndarray:
+def _one_hot(policy: np.ndarray, actions: int) -> np.ndarray:
     return policy[:, None] == np.arange(actions)
 
 

@@ -3,7 +3,8 @@
 import hashlib
 import io
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,17 @@ import qbumpers
 from qbumpers.errors import RequestError, checked
 from qbumpers.files import write_atomically
 from qbumpers.networks.network import Layout, Network, forward, named_parameters
+from qbumpers.values.others import (
+    arrays_of_others,
+    check_others,
+    digest_of_others,
+    provenance_of_others,
+)
 
 
 @dataclass(frozen=True, eq=False)
 class NetworkValues:
-    """Q*(s, a) of a task whose observations are vectors, and where it comes from.
+    """Q*(s, a) of a task whose observations are vectors, and if it comes from.
 
     Attributes:
         network: shape of the network.
@@ -29,10 +36,11 @@ class NetworkValues:
         task: name of the task.
         method: how they were made, in words.
         version: of the package that made them.
+        others: further values by name, of networks of the same shape, for rules that ask for them.
 
     Raises:
-        RequestError: where the number of parameters does not suit the shape, one is not finite, or
-            the discount is out of range.
+        RequestError: if the number of parameters does not suit the shape, one is not finite,
+            the discount is out of range, or further values do not suit.
     """
 
     network: Network
@@ -43,6 +51,7 @@ class NetworkValues:
     task: str
     method: str
     version: str = qbumpers.__version__
+    others: Mapping[str, "NetworkValues"] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check everything and freeze the parameters."""
@@ -62,6 +71,8 @@ class NetworkValues:
             raise RequestError(f"values of {self.task}: every parameter must be finite")
         parameters.flags.writeable = False
         object.__setattr__(self, "parameters", parameters)
+        object.__setattr__(self, "others", dict(self.others))
+        check_others(self, lambda values: values.layout)
 
     @cached_property
     def layout(self) -> Layout:
@@ -77,15 +88,16 @@ class NetworkValues:
                 f"({self.inputs},) is needed"
             )
         states = observations.size // self.inputs
-        room = np.zeros(self.layout.room(states), np.float32)
-        room[: observations.size] = observations.ravel()
-        values = forward(self.layout, self.parameters, room, states).astype(np.float64)
+        workspace = np.zeros(self.layout.workspace(states), np.float32)
+        workspace[: observations.size] = observations.ravel()
+        values = forward(self.layout, self.parameters, workspace, states).astype(np.float64)
         return values[0] if observations.ndim == 1 else values
 
     def digest(self) -> str:
         """A SHA-256 of shape, parameters and discount: equal for values that decide alike."""
         shape = json.dumps([*self.network, self.inputs, self.actions, self.discount])
-        return hashlib.sha256(shape.encode() + self.parameters.tobytes()).hexdigest()
+        content = shape.encode() + self.parameters.tobytes() + digest_of_others(self.others)
+        return hashlib.sha256(content).hexdigest()
 
     def save(self, path: str | Path) -> None:
         """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
@@ -94,14 +106,26 @@ class NetworkValues:
             path: of the file.
 
         Raises:
-            StoreError: where it cannot be written.
+            StoreError: if it cannot be written.
         """
         content = self.encoded()
         write_atomically(Path(path), lambda temporary: temporary.write_bytes(content))
 
     def encoded(self) -> bytes:
         """The values as the bytes of a NumPy `.npz` file."""
-        provenance = {
+        provenance = json.dumps({**self.provenance(), "sha256": self.digest()})
+        arrays: dict[str, Any] = {**self.arrays(), **arrays_of_others(self.others)}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, **arrays, provenance=provenance)
+        return buffer.getvalue()
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The numbers by the names that they have in a file."""
+        return named_parameters(self.layout, self.parameters)
+
+    def provenance(self) -> dict[str, Any]:
+        """Where the values come from, as JSON-like data."""
+        return {
             "network": self.network._asdict(),
             "inputs": self.inputs,
             "actions": self.actions,
@@ -109,12 +133,8 @@ class NetworkValues:
             "method": self.method,
             "discount": self.discount,
             "version": self.version,
-            "sha256": self.digest(),
+            **provenance_of_others(self.others),
         }
-        buffer = io.BytesIO()
-        arrays: dict[str, Any] = named_parameters(self.layout, self.parameters)
-        np.savez_compressed(buffer, **arrays, provenance=json.dumps(provenance))
-        return buffer.getvalue()
 
 
 def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) -> NetworkValues:
@@ -122,14 +142,15 @@ def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) ->
 
     Args:
         arrays: by name, see `qbumpers.networks.network.named_parameters`.
-        provenance: without the hash.
+        provenance: without the hash; in the place of the provenance of further values, if there are
+            any, those values.
 
     Returns:
         The values.
 
     Raises:
-        KeyError: where the shape of the network is missing.
-        RequestError: where it is no possible one, or an array is missing or does not suit it.
+        KeyError: if the shape of the network is missing.
+        RequestError: if it is no possible one, or an array is missing or does not suit it.
     """
     shape = dict(provenance)
     settings = dict(shape.pop("network"))

@@ -21,19 +21,19 @@ def learn_values(
     seed: int = 0,
     learner: QLearner | None = None,
 ) -> TabularValues:
-    """Q* by tabular Q-learning without help, over many episodes.
+    """Q* by unassisted tabular Q-learning over many episodes.
 
     Args:
-        task: the task.
+        task: what is to be learned.
         episodes: how many, at least 1.
         seed: of the random streams, not negative.
-        learner: schedules and discount; where None, the paper's, with the task's discount.
+        learner: schedules and discount; if None, the paper's, with the task's discount.
 
     Returns:
         The values of the last episode. Pairs that were never visited keep the initial value.
 
     Raises:
-        RequestError: where `episodes` is below 1 or `seed` is negative.
+        RequestError: if `episodes` is below 1 or `seed` is negative.
     """
     if episodes < 1:
         raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")

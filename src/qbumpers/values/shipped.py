@@ -19,7 +19,7 @@ def shipped_expert(task: str) -> NetworkValues:
         Its values.
 
     Raises:
-        RequestError: where none ships.
+        RequestError: if none ships.
     """
     shipped = {
         file.name.removesuffix(".npz"): file

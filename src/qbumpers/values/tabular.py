@@ -5,7 +5,8 @@ import io
 import json
 import math
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 from zipfile import BadZipFile
@@ -16,6 +17,13 @@ import qbumpers
 from qbumpers.errors import RequestError
 from qbumpers.files import write_atomically
 from qbumpers.values.network import NetworkValues, network_values
+from qbumpers.values.others import (
+    arrays_of_others,
+    check_others,
+    digest_of_others,
+    provenance_of_others,
+    separated,
+)
 
 # What NumPy and the archive's reader raise at a file of another kind, or with a byte changed.
 _DAMAGE = (
@@ -27,7 +35,7 @@ _DAMAGE = (
 class QValues(Protocol):
     """The assistant's action values: any callable from an observation to values.
 
-    A `discount` attribute, where there is one, says which discount the values were made with.
+    A `discount` attribute, if there is one, says which discount the values were made with.
     """
 
     def __call__(self, observation: Any, /) -> Any:
@@ -45,9 +53,12 @@ class TabularValues:
         task: name of the task.
         method: how they were made, in words.
         version: of the package that made them.
+        others: further values by name, of the same shape, for rules that ask for them; an array
+            [S, A] will do.
 
     Raises:
-        RequestError: where the table is not two-dimensional or holds a number that is not finite.
+        RequestError: if a table is not two-dimensional or holds a number that is not finite, or
+            further values do not suit.
     """
 
     table: np.ndarray
@@ -55,6 +66,7 @@ class TabularValues:
     task: str
     method: str
     version: str = qbumpers.__version__
+    others: Mapping[str, "TabularValues"] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check the table and freeze it."""
@@ -72,15 +84,25 @@ class TabularValues:
             )
         table.flags.writeable = False
         object.__setattr__(self, "table", table)
+        others = {name: self._further(given) for name, given in self.others.items()}
+        object.__setattr__(self, "others", others)
+        check_others(self, lambda values: values.table.shape)
+
+    def _further(self, given: Any) -> Any:
+        """Further values; an array is taken for a table of the same origin."""
+        if not isinstance(given, np.ndarray):
+            return given
+        return TabularValues(given, self.discount, self.task, self.method, self.version)
 
     def __call__(self, observation: Any, /) -> np.ndarray:
         """Q*(s, .) as float64 [A]; the observation is the number of the state."""
         return self.table[observation]
 
     def digest(self) -> str:
-        """A SHA-256 of the table and the discount: equal for values that decide alike."""
+        """A SHA-256 of tables and discounts: equal for values that decide alike."""
         shape = json.dumps([*self.table.shape, self.discount])
-        return hashlib.sha256(shape.encode() + self.table.tobytes()).hexdigest()
+        content = shape.encode() + self.table.tobytes() + digest_of_others(self.others)
+        return hashlib.sha256(content).hexdigest()
 
     def save(self, path: str | Path) -> None:
         """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
@@ -89,23 +111,32 @@ class TabularValues:
             path: of the file.
 
         Raises:
-            StoreError: where it cannot be written.
+            StoreError: if it cannot be written.
         """
         content = self.encoded()
         write_atomically(Path(path), lambda temporary: temporary.write_bytes(content))
 
     def encoded(self) -> bytes:
         """The values as the bytes of a NumPy `.npz` file."""
-        provenance = {
+        provenance = json.dumps({**self.provenance(), "sha256": self.digest()})
+        arrays: dict[str, Any] = {**self.arrays(), **arrays_of_others(self.others)}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, **arrays, provenance=provenance)
+        return buffer.getvalue()
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The numbers by the names that they have in a file."""
+        return {"table": self.table}
+
+    def provenance(self) -> dict[str, Any]:
+        """Where the values come from, as JSON-like data."""
+        return {
             "task": self.task,
             "method": self.method,
             "discount": self.discount,
             "version": self.version,
-            "sha256": self.digest(),
+            **provenance_of_others(self.others),
         }
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, table=self.table, provenance=json.dumps(provenance))
-        return buffer.getvalue()
 
 
 def load_values(path: str | Path) -> TabularValues | NetworkValues:
@@ -118,7 +149,7 @@ def load_values(path: str | Path) -> TabularValues | NetworkValues:
         The values.
 
     Raises:
-        RequestError: where the file is missing, is no such file, or was changed since.
+        RequestError: if the file is missing, is no such file, or was changed since.
     """
     try:
         content = Path(path).read_bytes()
@@ -141,7 +172,7 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
         The values.
 
     Raises:
-        RequestError: where it is no such file, its arrays do not fit together, or it was changed
+        RequestError: if it is no such file, its arrays do not fit together, or it was changed
             since.
     """
     try:
@@ -149,10 +180,7 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
             arrays = dict(archive.items())
         provenance = json.loads(str(arrays.pop("provenance")))
         expected = provenance.pop("sha256")
-        if "table" in arrays:
-            values = TabularValues(table=arrays["table"], **provenance)
-        else:
-            values = network_values(arrays, provenance)
+        values = _with_others(arrays, provenance)
     except RequestError as error:
         raise RequestError(f"values file {path}: {error}") from error
     except _DAMAGE as error:
@@ -162,6 +190,27 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
             f"values file {path}: its contents do not match its hash; it was changed"
         )
     return values
+
+
+def _with_others(
+    arrays: dict[str, np.ndarray], provenance: dict[str, Any]
+) -> TabularValues | NetworkValues:
+    own, further = separated(arrays)
+    origins = provenance.pop("others", {})
+    if set(further) != set(origins):
+        raise RequestError(
+            f"it holds further values {sorted(further)} and the provenance of {sorted(origins)}"
+        )
+    others = {name: _values(further[name], dict(origins[name])) for name in origins}
+    return _values(own, {**provenance, "others": others})
+
+
+def _values(
+    arrays: dict[str, np.ndarray], provenance: dict[str, Any]
+) -> TabularValues | NetworkValues:
+    if "table" in arrays:
+        return TabularValues(table=arrays["table"], **provenance)
+    return network_values(arrays, provenance)
 
 
 def check_width(values: Any, actions: int, where: str) -> np.ndarray:
@@ -176,14 +225,14 @@ def check_width(values: Any, actions: int, where: str) -> np.ndarray:
         float64 [A], a copy.
 
     Raises:
-        RequestError: where the width is wrong or a value is not finite.
+        RequestError: if the width is wrong or a value is not finite.
     """
     row = np.array(values, np.float64)
     if row.shape != (actions,):
         raise RequestError(
             f"Q values {where} have shape {row.shape}; one value an action, ({actions},), is needed"
         )
-    # The sum is finite only where every value is; it is ten times as fast to look at.
+    # The sum is finite only if every value is; it is ten times as fast to look at.
     if not math.isfinite(sum(row.tolist())) and not np.isfinite(row).all():
         raise RequestError(f"Q values {where} are {row.tolist()}; every value must be finite")
     return row

@@ -7,6 +7,11 @@ from typing import Any, Literal
 import gymnasium
 import numpy as np
 
+from qbumpers.decisions import Step
+from qbumpers.tasks.display import unassisted_step
+from qbumpers.tasks.displays.lunar_lander import lunar_lander_display
+from qbumpers.tasks.drawing import picture
+
 # First, for its message if Box2D is missing.
 from qbumpers.tasks.lunar_lander.stepper import chance_of
 
@@ -31,6 +36,9 @@ class LunarLander(original.LunarLander):
         self._terrain_seed = seed
         self._chance = chance_of(seed)
         self._actions: list[int] = []
+        self._display = lunar_lander_display(seed)
+        self._observation = np.zeros(8, np.float32)
+        self._last_step: Step | None = None
         super().__init__(render_mode=render_mode)
 
     def reset(
@@ -48,19 +56,30 @@ class LunarLander(original.LunarLander):
         """
         gymnasium.Env.reset(self, seed=seed)
         self._chance = chance_of(self._terrain_seed)
-        with self._drawing_from_chance():
+        with self._drawing_from_chance(), self._without_smoke():
             observation, _ = super().reset(options=options)
+        self._observation, self._last_step = observation, None
         self._actions = []  # without the one that Gymnasium's class begins with
         return observation, {"success": False, "crash": False}
 
     def step(self, action: int) -> tuple[np.ndarray, float, bool, Literal[False], dict[str, Any]]:
         """Take an action: 0 nothing, 1 left engine, 2 main engine, 3 right engine."""
-        with self._drawing_from_chance():
+        with self._drawing_from_chance(), self._without_smoke():
             observation, reward, terminated, truncated, _ = super().step(action)
+        self._last_step = unassisted_step(
+            self._observation, int(action), float(reward), observation
+        )
+        self._observation = observation
         self._actions.append(int(action))
         success = bool(terminated and reward > 0)
         info = {"success": success, "crash": bool(terminated and not success)}
         return observation, float(reward), terminated, truncated, info
+
+    def render(self) -> Any:
+        """For "rgb_array" the picture of the display, uint8 [H, W, 3]; Gymnasium's for "human"."""
+        if self.render_mode != "rgb_array":
+            return super().render()
+        return picture(self._display, self._observation, self._last_step)
 
     def snapshot(self) -> tuple[int, ...]:
         """The actions of the episode so far: all that its state comes from."""
@@ -72,7 +91,7 @@ class LunarLander(original.LunarLander):
         Args:
             snapshot: from `snapshot`.
         """
-        # Nothing is drawn meanwhile; the smoke of earlier steps, which changes nothing, is gone.
+        # Nothing is shown meanwhile; the smoke of earlier steps, which changes nothing, is gone.
         shown, self.render_mode = self.render_mode, None
         try:
             self.reset()
@@ -89,3 +108,13 @@ class LunarLander(original.LunarLander):
             yield
         finally:
             self._np_random = seeded
+
+    @contextmanager
+    def _without_smoke(self) -> Iterator[None]:
+        """Gymnasium makes particles for its own pictures alone, and only those clear them."""
+        shown = self.render_mode
+        self.render_mode = shown if shown == "human" else None
+        try:
+            yield
+        finally:
+            self.render_mode = shown

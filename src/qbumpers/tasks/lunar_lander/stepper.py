@@ -14,6 +14,8 @@ from gymnasium.utils import seeding
 
 from qbumpers.compilation import compiled
 from qbumpers.errors import RequestError
+from qbumpers.tasks.display import made_by
+from qbumpers.tasks.displays.lunar_lander import lunar_lander_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED
 from qbumpers.tasks.lunar_lander.bodies import (
     ANGLE,
@@ -201,6 +203,7 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         no_op=_NOTHING,
         action_distance=_ENGINES_THAT_DIFFER,
         implied=(_NOTHING, _ENGINES_THAT_DIFFER),
+        make_display=made_by(lunar_lander_display, seed),
     )
 
 
