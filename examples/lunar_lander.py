@@ -17,7 +17,7 @@ EVERY = 5  # steps from one picture to the next, of the 50 a second
 WIDTH, HEIGHT, FRAME = 300, 200, 4  # of a picture, in pixels
 
 ASSISTANTS = {
-    "alone": qbumpers.make_assistant("none"),
+    "unassisted": qbumpers.make_assistant("none"),
     "bumpers": qbumpers.make_assistant("stochastic-q-bumpers", alpha=0.8),
     "maximal": qbumpers.make_assistant("maximal"),
 }

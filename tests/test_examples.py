@@ -14,7 +14,7 @@ NEEDED = {
 }
 PRINTED = {
     "lunar_lander.py": (
-        r"alone: crashed after \d+ steps, return -\d+\.\d, 0 overrides; see \S+\.gif\n"
+        r"unassisted: crashed after \d+ steps, return -\d+\.\d, 0 overrides; see \S+\.gif\n"
         r"bumpers: \w+ after \d+ steps, return -?\d+\.\d, \d+ overrides; see \S+\.gif\n"
         r"maximal: landed after \d+ steps, return \d+\.\d, \d+ overrides; see \S+\.gif\n"
     ),

@@ -184,7 +184,8 @@ def result_type(function: Any, *types: Any) -> Any:
         NumbaError: if it cannot be compiled.
     """
     function.compile(types)
-    return function.overloads[types].signature.return_type
+    # A constant has a type of its own, which is also that of other whole numbers.
+    return numba.types.unliteral(function.overloads[types].signature.return_type)
 
 
 def is_compiled(function: Any) -> bool:

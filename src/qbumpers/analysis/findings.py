@@ -1,7 +1,7 @@
 """Every table of a report, from the trials of a run."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -10,7 +10,9 @@ from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.comparisons import RETURNS, against, compare_methods, optimal, pooled
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import summary, trial_samples
+from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import Experiment
+from qbumpers.experiments.learner_designs import written
 
 
 class LearnerFindings(NamedTuple):
@@ -88,13 +90,20 @@ def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
     Returns:
         The tables, without additions and sentences.
     """
-    options = {n.condition: n.assistant.options._asdict() for n in experiment.conditions()}
+    options = {n.condition: _as_cells(n.assistant) for n in experiment.conditions()}
     table = summary(trials, options, experiment.episodes, experiment.retention)
     learners = [
         _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
         for index, part in enumerate(table.partition_by("learner", maintain_order=True))
     ]
     return Findings(table, trials, learners)
+
+
+def _as_cells(assistant: Assistant) -> dict[str, Any]:
+    """Options as a table can hold them: tuples and other assistants as ids write them."""
+    plain = (bool, int, float, str)
+    fields = assistant.options._asdict()
+    return {f: v if isinstance(v, plain) else written(v) for f, v in fields.items()}
 
 
 def _about(

@@ -122,9 +122,14 @@ def _compile_once(
     memory = result_type(start, settings, type_of(shape), stream)
     rates = result_type(begin, settings, memory, whole, whole) if begin else whole
     arguments = (settings, memory, type_of(state), rates)
-    for function, last in ((choose, stream), (policy, type_of(np.zeros(2)))):
-        result_type(function, *arguments, last)
-    result_type(prefer, settings, memory, type_of(state), real)
+    chosen = (
+        result_type(choose, *arguments, stream),
+        result_type(prefer, settings, memory, type_of(state), real),
+    )
+    for name, found in zip(("choose", "prefer"), chosen, strict=True):
+        if not str(found).startswith(("int", "uint")):
+            raise TypeError(f"{name} returns {found}, not a whole number")
+    result_type(policy, *arguments, type_of(np.zeros(2)))
     transition = type_of(Transition(state, 0, 0.0, state, False, -1))
     result_type(learn, settings, memory, transition, rates, stream)
 
