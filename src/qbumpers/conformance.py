@@ -17,7 +17,7 @@ from qbumpers.assistants import Assistant
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.learners import dispatch, learner_for_settings
-from qbumpers.learners.interface import Shape
+from qbumpers.learners.interface import Shape, Transition
 from qbumpers.networks import Network
 from qbumpers.random_streams import LEARNER, trial_streams
 from qbumpers.registration import as_numbers
@@ -26,7 +26,7 @@ from qbumpers.shared_control import RECORD, SharedControl
 from qbumpers.simulation import Condition, Setup, deep, make_condition, tabular
 from qbumpers.tasks import TabularTask, Task, VectorTask, cliff_walking
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
-from qbumpers.values import NetworkValues
+from qbumpers.values import NetworkValues, solve
 
 _EPISODES, _RETENTION, _SEED = 4, 1, 2019
 _TOLERANCE = 1e-12  # of probabilities: two ways to the same exponential
@@ -249,8 +249,6 @@ def check_policy(settings: Any, *, draws: int = 20_000, seed: int = _SEED) -> fl
 def _learn_something(
     task: TabularTask, numbers: Any, memory: Any, rates: Any, stream: np.ndarray, state: int
 ) -> None:
-    from qbumpers.learners.interface import Transition
-
     for action in range(task.actions):
         next_state, reward = int(task.next_state[state, action, 0]), task.reward[state, action, 0]
         ended = bool(task.terminated[state, action, 0])
@@ -272,8 +270,6 @@ def small_values(task: Task, assistant: Assistant) -> Any:
     """Values for one of the `small_tasks`, with the further rows that the rule named."""
     generator = np.random.default_rng(_SEED)
     if task.states:
-        from qbumpers.values import solve
-
         solved = solve(task)
         tables = {n: _random_table(generator, task) for n in assistant.values}
         others = {n: _WithOthers(table, solved.discount) for n, table in tables.items()}
@@ -298,14 +294,20 @@ def _random_network(generator: np.random.Generator, task: Task) -> NetworkValues
 
 @functools.cache
 def slippery_corridor() -> TabularTask:
-    """Five cells; right leads on with 3 in 4, left back; the last cell ends it with reward 10."""
-    transition = np.zeros((5, 2, 5))
+    """Five cells and four actions: back, on (slips back 1 time in 4), stay, and back to the start.
+
+    Every step costs 1; the last cell ends the episode with 10. As many actions as Cliff Walking
+    has, so that loops are compiled once for both.
+    """
+    transition = np.zeros((5, 4, 5))
     for cell in range(5):
         back, on = max(cell - 1, 0), min(cell + 1, 4)
         transition[cell, 0, back] += 1
         transition[cell, 1, on] += 0.75
         transition[cell, 1, back] += 0.25
-    reward = np.full((5, 2, 5), -1.0)
+        transition[cell, 2, cell] += 1
+        transition[cell, 3, 0] += 1
+    reward = np.full((5, 4, 5), -1.0)
     reward[:, :, 4] = 10
     last = np.arange(5) == 4
     return TabularTask.from_arrays(
