@@ -86,7 +86,8 @@ def compiled_apart(function: F) -> F:
     Returns:
         The same function.
     """
-    return _kept(function, _SETTINGS)
+    # Said outright: else a function called from a piece that is inlined would be inlined too.
+    return _kept(function, {"forceinline": False, **_SETTINGS})
 
 
 def _kept(function: Any, settings: dict[str, Any]) -> Any:

@@ -119,8 +119,7 @@ class _Trial:
         self._memory = start_learner(condition.learner, shape, self._streams[LEARNER])
         self._settings, self._perception, self._motor, _ = compiled_learner(condition)
         self._numbers = np.zeros(5)
-        self._assistance = {True: _assistance(condition)}
-        self._assistance[False] = self._assistance[True]._replace(options=None)
+        self._assistance = _assistance(condition)
         self._rule_memory = condition.assistant.start(condition.model())
         self._undoes = "undo" in condition.assistant.needs
         self._rates = begin_learner(condition.learner, self._memory, 0, condition.episodes)
@@ -137,17 +136,17 @@ class _Trial:
         if self._interpreted or not (assistant.compiled and learner.compiled):
             calls = tuple(map(uncompiled, calls))
         observation = np.zeros(self._task.observation_size, np.float32)
-        learning = (self._settings, self._memory, self._rates)
-        helped = (self._assistance[assisted], self._rule_memory)
+        options = self._condition.assistant.numbers if assisted else None
+        helped = (self._assistance, options, self._rule_memory)
         script = None if self._script is None else (0, 0.0, 0.0)
         stream = self._streams[EVALUATION]
         return _Calls(
             entered(
-                calls[0], *learning, self._motor, *helped, observation, self._numbers, 0,
+                calls[0], self._learner(), *helped, observation, self._numbers, 0,
                 self._streams, script,
             ),
             entered(
-                calls[1], *learning, self._perception, *helped, observation,
+                calls[1], self._learner(), self._perception, *helped, observation,
                 (0, 0, False, 0.0, 0.0, 0.0), (observation, 0.0, 0, 0), self._numbers,
                 self._streams,
             ),
@@ -156,6 +155,10 @@ class _Trial:
                 stream,
             ),
         )  # fmt: skip
+
+    def _learner(self) -> tuple[Any, Any, Any, Any]:
+        """The learner as the pieces of a step take it."""
+        return self._settings, self._memory, self._rates, self._motor
 
     def run_episodes(self, episode: int, outcomes: Outcomes, place: int) -> None:
         """An episode of training, then a greedy unassisted one.
@@ -202,11 +205,11 @@ class _Trial:
         """The record of a step of training, and the observation after it."""
         episode = int(self._numbers[3])
         assisted = episode < self._condition.episodes
-        calls, assistance = self._calls[assisted], self._assistance[assisted]
-        learning = (self._settings, self._memory, self._rates)
+        calls, learner = self._calls[assisted], self._learner()
+        options = self._condition.assistant.numbers if assisted else None
         first = self._numbers[4] == 0
         chosen = calls.act(
-            *learning, self._motor, assistance, self._rule_memory, observation, self._numbers,
+            learner, self._assistance, options, self._rule_memory, observation, self._numbers,
             last, self._streams, script,
         )  # fmt: skip
         if first:
@@ -219,18 +222,18 @@ class _Trial:
         happened = events & ~_ENDED if undone else events
         happened |= LIMIT if final and not happened & _ENDED else 0
         credited, projected, self._rule_memory, sound = calls.take(
-            *learning, self._perception, assistance, self._rule_memory, observation, chosen,
-            (next_observation, reward, events, happened), self._numbers, self._streams,
+            learner, self._perception, self._assistance, options, self._rule_memory, observation,
+            chosen, (next_observation, reward, events, happened), self._numbers, self._streams,
         )  # fmt: skip
         if not sound:
             raise self._not_finite(episode, int(self._numbers[4]), next_observation, reward)
         step = Step(
             episode, observation, proposed, executed, undone, credited,
-            proposed != executed or undone, probability, coin, tie, assistance.row, projected,
+            proposed != executed or undone, probability, coin, tie, self._assistance.row, projected,
             reward, next_observation, happened,
         )  # fmt: skip
         if self._rows is not None:
-            self._rows.append(step._replace(values=assistance.row.copy()))
+            self._rows.append(step._replace(values=self._assistance.row.copy()))
         return step, after
 
     def _environment_step(
@@ -300,16 +303,13 @@ class _Trial:
 def _assistance(condition: Condition) -> NetworkAssistance:
     values, others = condition.values, condition.others
     actions = condition.task.actions
-    further = [network.parameters for network in others]
-    further_parameters = np.stack(further) if further else np.zeros((0, 1), np.float32)
-    further_parameters.flags.writeable = False  # of the same type as those of Q*
+    parameters = np.stack([each.parameters for each in (values, *others)])
+    parameters.flags.writeable = False
     return NetworkAssistance(
         layout=values.layout,
-        parameters=values.parameters,
-        others=further_parameters,
+        parameters=parameters,
         workspace=np.zeros(values.layout.workspace(1), np.float32),
         row=np.zeros(actions),
         other_rows=np.zeros((len(others), actions)),
         discount=condition.discount,
-        options=condition.assistant.numbers,
     )

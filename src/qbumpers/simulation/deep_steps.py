@@ -15,7 +15,6 @@ from qbumpers.decisions import (
     Account,
     Execution,
     Noise,
-    Step,
     projected_return,
     settle,
     situate,
@@ -40,23 +39,19 @@ class NetworkAssistance(NamedTuple):
 
     Attributes:
         layout: of the network of its values.
-        parameters: float32 [P], of Q*.
-        others: float32 [K, P], of the further rows that its rule named.
+        parameters: float32 [1 + K, P], of Q* and of the further rows that its rule named.
         workspace: float32, of the network.
         row: float64 [A], filled with Q*(s, .).
         other_rows: float64 [K, A], filled with the further rows.
         discount: of the values.
-        options: of its rule, as numbers; their type selects it. None if it is not there.
     """
 
     layout: Layout
     parameters: np.ndarray
-    others: np.ndarray
     workspace: np.ndarray
     row: np.ndarray
     other_rows: np.ndarray
     discount: float
-    options: Any
 
 
 class Chosen(NamedTuple):
@@ -97,19 +92,6 @@ class Outcome(NamedTuple):
 
 
 @inlined
-def _fill(assistance: NetworkAssistance, observation: np.ndarray) -> None:
-    """Write the assistant's values of an observation into its rows."""
-    layout, workspace = assistance.layout, assistance.workspace
-    values = values_of(layout, assistance.parameters, workspace, observation)
-    for action in range(len(assistance.row)):
-        assistance.row[action] = values[action]
-    for place in range(len(assistance.other_rows)):
-        values = values_of(layout, assistance.others[place], workspace, observation)
-        for action in range(len(assistance.row)):
-            assistance.other_rows[place, action] = values[action]
-
-
-@inlined
 def _account(numbers: np.ndarray) -> Account:
     return Account(
         numbers[EARNED], numbers[DISCOUNT], numbers[START_VALUE], int(numbers[EPISODE]),
@@ -117,53 +99,22 @@ def _account(numbers: np.ndarray) -> Account:
     )  # fmt: skip
 
 
-@inlined
-def _decided(options: Any, memory: Any, situation: Any, noise: Noise) -> Chosen:
-    """What the assistant decides; the proposal if it is not there."""
-    if options is None:
-        return Chosen(situation.proposed, situation.proposed, False, 0.0, noise.coin, noise.tie)
-    decision = decide(situation, noise, options, memory)
-    return Chosen(
-        situation.proposed, int(decision.action), undoes(decision), float(decision.probability),
-        noise.coin, noise.tie,
-    )  # fmt: skip
-
-
-@inlined
-def _observed(options: Any, memory: Any, step: Step) -> Any:
-    """The rule's memory after a step; unchanged if the assistant is not there."""
-    if options is None:
-        return memory
-    return observe(memory, step, options)
-
-
-@inlined
-def _proposed(
-    script: Any, settings: Any, memory: Any, rates: Any, motor: Any, observation: np.ndarray,
-    last: int, actions: int, streams: np.ndarray,
-) -> tuple[int, Noise]:  # fmt: skip
-    """What the learner proposes, and the assistant's noise; or what a script says."""
-    if script is None:
-        meant = choose(settings, memory, observation, rates, streams[LEARNER])
-        proposed = move(motor, meant, last, actions, streams[LEARNER])
-        return proposed, Noise(draw(streams[ASSISTANT]), draw(streams[ASSISTANT]))
-    return script[0], Noise(script[1], script[2])
+# Every function that one of these calls in compiled code is linked and optimised once more with it,
+# which takes seconds: so they are long, and call few.
 
 
 @compiled_apart
 def act(
-    settings: Any, memory: Any, rates: Any, motor: Any, assistance: NetworkAssistance,
-    rule_memory: Any, observation: np.ndarray, numbers: np.ndarray, last: int, streams: np.ndarray,
-    script: Any,
+    learner: Any, assistance: NetworkAssistance, options: Any, rule_memory: Any,
+    observation: np.ndarray, numbers: np.ndarray, last: int, streams: np.ndarray, script: Any,
 ) -> tuple[int, int, bool, float, float, float]:  # fmt: skip
     """The learner proposes an action and the assistant decides.
 
     Args:
-        settings: of the learner, as numbers.
-        memory: of the learner.
-        rates: of the learner in this episode.
-        motor: how the learner's hand errs; or None.
+        learner: its settings as numbers, its memory, its rates in this episode, and how its hand
+            errs, a `Motor` or None.
         assistance: its rows are filled.
+        options: of its rule, as numbers; their type selects it. None if it is not there.
         rule_memory: of the assistant's rule.
         observation: float32 [D].
         numbers: float64 [5], the account of the episode; its start value is filled on the first
@@ -175,36 +126,47 @@ def act(
     Returns:
         The fields of `Chosen`.
     """
-    _fill(assistance, observation)
+    settings, memory, rates, motor = learner
+    row, other_rows = assistance.row, assistance.other_rows
+    actions, others = len(row), len(other_rows)
+    for place in range(others + 1):  # in one loop, so that the network is compiled in once
+        parameters = assistance.parameters[place]
+        values = values_of(assistance.layout, parameters, assistance.workspace, observation)
+        for action in range(actions):
+            if place == 0:
+                row[action] = values[action]
+            else:
+                other_rows[place - 1, action] = values[action]
     if numbers[STEP] == 0:
-        numbers[START_VALUE] = best_value(assistance.row)
-    actions = len(assistance.row)
-    proposed, noise = _proposed(
-        script, settings, memory, rates, motor, observation, last, actions, streams
-    )
-    situation = situate(
-        _account(numbers), observation, assistance.row, assistance.other_rows, proposed
-    )
-    chosen = _decided(assistance.options, rule_memory, situation, noise)
+        numbers[START_VALUE] = best_value(row)
+    if script is None:
+        meant = choose(settings, memory, observation, rates, streams[LEARNER])
+        proposed = move(motor, meant, last, actions, streams[LEARNER])
+        noise = Noise(draw(streams[ASSISTANT]), draw(streams[ASSISTANT]))
+    else:
+        proposed, noise = script[0], Noise(script[1], script[2])
+    if options is None:
+        return proposed, proposed, False, 0.0, noise.coin, noise.tie
+    situation = situate(_account(numbers), observation, row, other_rows, proposed)
+    decision = decide(situation, noise, options, rule_memory)
     return (
-        chosen.proposed, chosen.executed, chosen.undone, chosen.probability, chosen.coin, chosen.tie
+        proposed, int(decision.action), undoes(decision), float(decision.probability),
+        noise.coin, noise.tie,
     )  # fmt: skip
 
 
 @compiled_apart
 def take(
-    settings: Any, memory: Any, rates: Any, perception: Any, assistance: NetworkAssistance,
-    rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any, numbers: np.ndarray,
-    streams: np.ndarray,
+    learner: Any, perception: Any, assistance: NetworkAssistance, options: Any, rule_memory: Any,
+    observation: np.ndarray, chosen: Any, outcome: Any, numbers: np.ndarray, streams: np.ndarray,
 ) -> tuple[int, float, Any, bool]:  # fmt: skip
     """The learner learns from a step, and the account and the rule's memory take it in.
 
     Args:
-        settings: of the learner, as numbers.
-        memory: of the learner.
-        rates: of the learner in this episode.
+        learner: as for `act`.
         perception: as numbers.
         assistance: as `act` left it.
+        options: as for `act`.
         rule_memory: of the assistant's rule.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
@@ -217,6 +179,7 @@ def take(
         rule's memory, and whether reward and observation are finite; if they are not, nothing was
         learned.
     """
+    settings, memory, rates, _ = learner
     proposed, executed, undone, probability, coin, tie = chosen
     next_observation, reward, events, happened = outcome
     account = _account(numbers)
@@ -234,7 +197,8 @@ def take(
         Noise(coin, tie), Execution(executed, undone, probability), experience.action, reward,
         next_observation, happened,
     )  # fmt: skip
-    rule_memory = _observed(assistance.options, rule_memory, step)
+    if options is not None:
+        rule_memory = observe(rule_memory, step, options)
     if experience.action >= 0:
         transition = believed(experience, observation, next_observation, events & TERMINATED != 0)
         learn(settings, memory, transition, rates, streams[LEARNER])
