@@ -15,6 +15,8 @@ ROWS, COLUMNS, START, GOAL = 4, 12, 36, 47
 MOVES = [(-1, 0), (0, 1), (1, 0), (0, -1)]
 EPISODES, DECAY, LIMIT = 100, 90, 100
 
+NO_FURTHER_ROWS = np.zeros((0, 4))
+
 
 class Totals(NamedTuple):
     """What some trials add up to.
@@ -88,7 +90,9 @@ def assisted_episode(
             proposed = int(generator.random() * len(MOVES))
         else:
             proposed = greedy(own_values[state], generator)
-        situation = Situation(values[state], proposed, earned, 1.0, start_value)
+        situation = Situation(
+            state, values[state], NO_FURTHER_ROWS, proposed, earned, 1.0, start_value, 0, length - 1
+        )
         noise = Noise(generator.random(), generator.random())
         next_state, reward, ends = move(state, assistant.decide(situation, noise).action)
         future = 0.0 if ends else max(own_values[next_state])
