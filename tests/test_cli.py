@@ -7,7 +7,6 @@ import pytest
 import qbumpers
 from qbumpers import cli
 from qbumpers.assistants import assistants
-from qbumpers.learners import PERCEPTIONS
 from tests.experiments.examples import PLAIN, contents_of, run_into, write_toml
 from tests.texts import words
 
@@ -81,18 +80,6 @@ def test_tasks_are_listed_by_the_names_that_experiments_use(call):
     assert status == 0
     for name in ("cliff-walking", "FrozenLake-v1", "Taxi-v4"):
         assert any(line.startswith(f"{name} ") for line in output.splitlines())
-
-
-def test_learners_are_listed_with_what_they_believe(call):
-    status, output, _ = call("list", "learners")
-    assert status == 0
-    rows = {line.split()[1]: line for line in output.splitlines() if line.startswith("q-learning")}
-    assert rows.keys() == PERCEPTIONS.keys()
-    assert rows["transition"].endswith("its own action no")
-    assert rows["observant"].endswith("the executed action no")
-    assert rows["interruption"].endswith("nothing no")
-    assert rows["disruption"].endswith("the executed action yes")
-    assert rows["transition-disruption"].endswith("its own action yes")
 
 
 WRONG_COMMANDS = {

@@ -102,12 +102,12 @@ def test_a_rule_that_is_not_a_function_of_its_arguments_is_found():
 
     def moody(situation, noise, options):
         calls.append(0)
-        action = len(calls) % len(situation.values)
+        action = 0 if len(calls) <= 20 else 1
         return Decision(action, 1.0 if action != situation.proposed else 0.0)
 
     with pytest.warns(UserWarning, match="cannot be compiled"):
         register_assistant("moody", NoOptions)(moody)
-    with pytest.raises(ConformanceError, match=r"corridor, plain Python: step \d+: "):
+    with pytest.raises(ConformanceError, match="corridor, plain Python: "):
         check_conformance(make_assistant("moody"), tasks=[slippery_corridor()])
 
 

@@ -229,7 +229,7 @@ def check_policy(settings: Any, *, draws: int = 20_000, seed: int = _SEED) -> fl
     stream = trial_streams(seed, "conformance", range(1))[0, LEARNER]
     memory = dispatch.start(numbers, Shape(task.states, 0, (0,) * task.actions), stream)
     out, worst = np.zeros(task.actions), 0.0
-    for episode, state in enumerate((36, 24, 25, 13)):
+    for episode, state in enumerate((36, 24, 25, 13) * 2):  # before and after learning there
         rates = dispatch.begin(numbers, memory, episode, 8)
         counts = np.zeros(task.actions)
         dispatch.policy(numbers, memory, state, rates, out)

@@ -1,6 +1,6 @@
 """`qbumpers list` names what deep learners need."""
 
-from qbumpers.learners import PERCEPTIONS
+from qbumpers.learners import PERCEPTIONS, learners
 from tests.texts import words
 
 
@@ -11,11 +11,21 @@ def test_tasks_observed_as_vectors_are_listed(call):
         assert any(line.startswith(f"{name} ") for line in output.splitlines())
 
 
-def test_both_ways_of_learning_are_listed_with_every_perception(call):
+def test_every_learner_is_listed_with_what_it_learns_from(call):
     status, output, _ = call("list", "learners")
     assert status == 0
-    rows = [line.split()[:2] for line in output.splitlines()]
-    for name in PERCEPTIONS:
-        assert ["q-learning", name] in rows
-        assert ["double-dqn", name] in rows
-    assert "tasks observed as vectors by double-dqn" in words(output)
+    for name, learner in learners().items():
+        assert name in words(output)
+        assert all(field in output for field in learner.settings_type._fields)
+    assert "numbered states" in words(output)
+    assert "vectors" in words(output)
+    assert "qbumpers list perceptions" in words(output)
+
+
+def test_every_perception_is_listed_with_what_it_credits(call):
+    status, output, _ = call("list", "perceptions")
+    assert status == 0
+    rows = [line.split()[:4] for line in output.splitlines()]
+    for name, perception in PERCEPTIONS.items():
+        shown = [name, f"{perception.notices:.0%}", perception.credits, f"{perception.penalty:g}"]
+        assert shown in rows

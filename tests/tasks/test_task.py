@@ -47,7 +47,8 @@ def test_a_table_says_what_it_is():
     task = random_task(0, 5, 3)
     assert (task.states, task.observation_size, task.actions) == (5, 0, 3)
     assert task.observation_space == spaces.Discrete(5)
-    assert (task.no_op, task.has_distance, task.seen, task.display) == (-1, False, None, None)
+    assert (task.no_op, task.has_distance, task.seen) == (-1, False, None)
+    assert task.display.actions == ("action 0", "action 1", "action 2")
     assert task.distance.tolist() == [[0, 1, 1], [1, 0, 1], [1, 1, 0]]
     assert task.learners == ("q-learning", "sarsa", "expected-sarsa")
     assert task.value_sources == ("exact", "q-learning")
@@ -58,7 +59,8 @@ def test_a_table_says_what_it_is():
 def test_a_vector_task_says_what_it_is(cart):
     assert (cart.states, cart.observation_size, cart.actions) == (0, 4, 2)
     assert cart.observation_space == spaces.Box(-np.inf, np.inf, (4,), np.float32)
-    assert (cart.no_op, cart.has_distance, cart.seen, cart.display) == (-1, False, None, None)
+    assert (cart.no_op, cart.has_distance, cart.seen) == (-1, False, None)
+    assert cart.display.actions == ("left", "right")
     assert cart.distance.tolist() == [[0, 1], [1, 0]]
     assert cart.learners == ("double-dqn",)
     assert cart.value_sources == ("expert",)
@@ -188,7 +190,7 @@ def test_a_table_makes_an_environment_that_ends_at_its_limit():
 
 
 def test_a_picture_that_a_table_does_not_have_is_refused():
-    with pytest.raises(RequestError, match="render_mode = 'human'; known: there are none"):
+    with pytest.raises(RequestError, match="render_mode = 'human'; known: rgb_array"):
         make_task(**LAKE).make_environment(render_mode="human")
     with pytest.raises(RequestError, match="render_mode = 'human'; known: ansi, rgb_array"):
         CliffWalking(render_mode="human")

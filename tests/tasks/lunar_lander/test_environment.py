@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -11,6 +12,8 @@ from gymnasium.utils.env_checker import check_env
 
 from qbumpers import RequestError, make_task
 from qbumpers.tasks import VectorTask
+from qbumpers.tasks.display import unassisted_step
+from qbumpers.tasks.drawing import picture
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED
 from qbumpers.tasks.lunar_lander.stepper import Lander
 from tests.tasks.landing import actions_of
@@ -40,18 +43,18 @@ def test_people_and_simulators_have_the_same_episode(seed, policy, render_mode):
     environment.close()
 
 
-def test_it_is_drawn_as_gymnasiums_is():
-    pictures = []
-    for name, seed in [(NAME, 3), ("LunarLander-v3", None)]:
-        arguments = {} if seed is None else {"seed": seed}
-        environment = gymnasium.make(name, render_mode="rgb_array", **arguments)
-        environment.reset(seed=3)
-        for action in (2, 2, 3, 0, 1):
-            environment.step(action)
-        pictures.append(environment.render())
-        environment.close()
-    assert pictures[0].shape == (400, 600, 3)
-    assert np.array_equal(*pictures)
+def test_its_picture_is_that_of_its_display():
+    environment = gymnasium.make(NAME, render_mode="rgb_array", seed=3)
+    observation, _ = environment.reset(seed=3)
+    for action in (2, 2, 3, 0, 1):
+        before = observation
+        observation, reward, *_ = environment.step(action)
+    shown = make_task("lunar-lander", seed=3).display
+    step = unassisted_step(before, 1, float(reward), observation)
+    found: Any = environment.render()
+    assert found.shape == (400, 600, 3)
+    assert np.array_equal(found, picture(shown, observation, step))
+    assert not np.array_equal(found, picture(shown, before, None))
 
 
 @pytest.mark.parametrize("seed", [None, 0])
