@@ -31,6 +31,7 @@ from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from qbumpers.values import QValues, check_width
+from qbumpers.values.others import further_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
 _perceive = uncompiled(perceive)
@@ -74,7 +75,7 @@ class Session:
         self.assistant, self.values, self.model = assistant, values, model
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
-        self._others = [_further(values, name, assistant) for name in assistant.values]
+        self._others = [further_values(values, name, assistant.name) for name in assistant.values]
         self._memory = assistant.start(model)
         self._episode = -1
         self.account = Account(0.0, 1.0, 0.0, 0, 0)
@@ -173,16 +174,6 @@ class Session:
             others[place] = check_width(further(state), actions, where)
         row.flags.writeable = others.flags.writeable = False
         return row, others
-
-
-def _further(values: Any, name: str, assistant: Assistant) -> Any:
-    further = getattr(values, "others", {})
-    if name not in further:
-        known = ", ".join(further) or "none"
-        raise RequestError(
-            f"assistant {assistant.name}: it needs further values {name!r}; known: {known}"
-        )
-    return further[name]
 
 
 def _as_state(state: Any) -> Any:

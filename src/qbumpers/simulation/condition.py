@@ -16,6 +16,7 @@ from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
+from qbumpers.values.others import further_values
 
 _FIRST_LEARNERS = ("q-learning", "double-dqn")  # what these seed does not name them
 
@@ -261,21 +262,10 @@ def _checked_values(
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
     for place, name in enumerate(assistant.values):
-        others[:, place] = _table(task, _further(source, name, assistant), f" {name!r}")
+        others[:, place] = _table(task, further_values(source, name, assistant.name), f" {name!r}")
     for state in np.flatnonzero(task.start):
         assistant.check_start(float(table[state].max()))
     return table, others, float(getattr(source, "discount", task.discount))
-
-
-def _further(source: Any, name: str, assistant: Assistant) -> Any:
-    """Further values beside Q*, by name."""
-    further = getattr(source, "others", {})
-    if name not in further:
-        known = ", ".join(further) or "none"
-        raise RequestError(
-            f"assistant {assistant.name}: it needs further values {name!r}; known: {known}"
-        )
-    return further[name]
 
 
 def _table(task: Task, source: Any, name: str) -> np.ndarray:
@@ -297,7 +287,7 @@ def _checked_network(
             f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
-    others = tuple(_further(values, name, assistant) for name in assistant.values)
+    others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
     for network in (values, *others):
         found = (network.inputs, network.actions)
         if found != (task.observation_size, task.actions):

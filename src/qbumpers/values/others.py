@@ -78,3 +78,23 @@ def separated(
         else:
             own[full_name] = numbers
     return own, others
+
+
+def further_values(values: Any, name: str, assistant: str) -> Any:
+    """Further values beside Q*, by name.
+
+    Args:
+        values: of the assistant, of any kind.
+        name: of what its rule asks for.
+        assistant: its name, for the message.
+
+    Raises:
+        RequestError: if the values hold none of the name.
+    """
+    further = getattr(values, "others", {})
+    if name not in further:
+        known = ", ".join(further) or "none"
+        raise RequestError(
+            f"assistant {assistant}: it needs further values {name!r}; known: {known}"
+        )
+    return further[name]
