@@ -54,7 +54,7 @@ def grid_display(
     """A grid on which an orange dot walks; states are numbered row by row.
 
     Args:
-        cells: what stands in each cell, [rows][columns]: S start, G goal, C cliff, F ice, H hole,
+        cells: what stands in each cell, row by row: S start, G goal, C cliff, F ice, H hole,
             "." nothing; anything else is written as it is.
         actions: a name for each.
         keys: from keys to actions.
