@@ -160,3 +160,27 @@ def test_entered_code_gives_what_the_function_gives_and_compiles_once():
 def test_a_function_that_is_not_compiled_is_entered_as_it_is():
     plain = compilation.uncompiled(_weigh)
     assert compilation.entered(plain, np.zeros(2)) is plain
+
+
+@compilation.compiled_for_session
+def _grow(common, amount):
+    pair, numbers = common.content
+    numbers[0] += amount
+    return pair.first + numbers.sum()
+
+
+def test_held_values_are_entered_with_and_stay_the_same_arrays():
+    numbers = np.array([1.0, 2.0])
+    common = compilation.hold((Pair(3, 0.5), numbers))
+    entry = compilation.entered(_grow, common, 0.0)
+    assert entry(common, 4.0) == 3 + 7
+    numbers[1] = 10.0
+    assert entry(common, 1.0) == 3 + 16
+    assert numbers.tolist() == [6.0, 10.0]
+
+
+def test_held_values_outlive_the_names_of_their_arrays():
+    common = compilation.hold((Pair(1, 0.5), np.full(1000, 2.0)))
+    others = [np.full(1000, 9.0) for _ in range(50)]  # would reuse memory that was given back
+    assert len(others) == 50
+    assert _grow(common, 0.0) == 1 + 2000

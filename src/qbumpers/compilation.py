@@ -16,6 +16,7 @@ import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
+from numba.experimental import structref
 from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -25,7 +26,10 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 """Settings for pieces of a hot loop: their calls must vanish, with all reference counting."""
 
 
-_NEVER_COMPILED = {"analysis", "cli", "experiments", "files.py", "shared_control.py", "tuning"}
+_NEVER_COMPILED = {
+    "analysis", "cli", "conformance.py", "experiments", "files.py", "reproduction", "session.py",
+    "shared_control.py", "tuning",
+}  # fmt: skip
 
 
 @functools.cache
@@ -118,6 +122,41 @@ def compiled_for_session(function: F) -> F:
     """
     dispatcher: Any = numba.njit(**INLINE)(function)
     return dispatcher
+
+
+@structref.register
+class _HeldType(numba.types.StructRef):
+    """Numba's type of `Held`."""
+
+
+class Held(structref.StructRefProxy):
+    """Values that compiled code is entered with again and again; `hold` makes one.
+
+    Numba takes every argument of a call apart, which for tuples of many arrays takes microseconds.
+    These were taken apart once.
+
+    Attributes:
+        content: the values; compiled code alone reads them.
+    """
+
+    def __new__(cls, content: Any) -> "Held":
+        """Compiled code alone makes one."""
+        return hold(content)
+
+
+structref.define_boxing(_HeldType, Held)
+structref.define_constructor(Held, _HeldType, ["content"])
+structref.define_attributes(_HeldType)
+
+
+@compiled_apart
+def hold(content: Any) -> Held:
+    """Take values apart for compiled code.
+
+    Args:
+        content: of a type that compiled code has; its arrays stay the same arrays.
+    """
+    return Held(content)
 
 
 def entered(function: Any, *examples: Any) -> Any:

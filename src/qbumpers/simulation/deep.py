@@ -4,7 +4,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from qbumpers.compilation import compiled_for_session, entered, uncompiled
+from qbumpers.compilation import compiled_for_session, entered, hold, uncompiled
 from qbumpers.decisions import Step, checked_action
 from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
@@ -15,7 +15,9 @@ from qbumpers.simulation.condition import Condition, compiled_learner, outcome_r
 from qbumpers.simulation.deep_steps import (
     NOT_FINITE,
     START_VALUE,
+    Common,
     NetworkAssistance,
+    Pieces,
     act,
     preferred,
     take,
@@ -114,7 +116,9 @@ class _Trial:
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
         self._rows, self._script, self._played = rows, script, 0
-        self._interpreted = interpreted
+        self._compiled = (
+            not interpreted and condition.assistant.compiled and condition.learner_type.compiled
+        )
         shape = Shape(0, task.observation_size, (0,) * task.actions)
         self._memory = start_learner(condition.learner, shape, self._streams[LEARNER])
         self._settings, self._perception, self._motor, _ = compiled_learner(condition)
@@ -133,32 +137,27 @@ class _Trial:
         calls = (act, take, preferred)
         if not (assistant.built_in and learner.built_in):
             calls = tuple(_SESSION[each] for each in calls)
-        if self._interpreted or not (assistant.compiled and learner.compiled):
+        if not self._compiled:
             calls = tuple(map(uncompiled, calls))
+        common = self._common(assisted)
         observation = np.zeros(self._task.observation_size, np.float32)
-        options = self._condition.assistant.numbers if assisted else None
-        helped = (self._assistance, options, self._rule_memory)
         script = None if self._script is None else (0, 0.0, 0.0)
-        stream = self._streams[EVALUATION]
+        chosen, outcome = (0, 0, False, 0.0, 0.0, 0.0), (observation, 0.0, 0, 0)
         return _Calls(
-            entered(
-                calls[0], self._learner(), *helped, observation, self._numbers, 0,
-                self._streams, script,
-            ),
-            entered(
-                calls[1], self._learner(), self._perception, *helped, observation,
-                (0, 0, False, 0.0, 0.0, 0.0), (observation, 0.0, 0, 0), self._numbers,
-                self._streams,
-            ),
-            entered(
-                calls[2], self._settings, self._memory, self._motor, observation, 0.0, 0, 0, True,
-                stream,
-            ),
-        )  # fmt: skip
+            entered(calls[0], common, self._rule_memory, observation, 0, script),
+            entered(calls[1], common, self._rule_memory, observation, chosen, outcome),
+            entered(calls[2], common, observation, 0.0, 0, True),
+        )
 
-    def _learner(self) -> tuple[Any, Any, Any, Any]:
-        """The learner as the pieces of a step take it."""
-        return self._settings, self._memory, self._rates, self._motor
+    def _common(self, assisted: bool) -> Any:
+        """What the steps of an episode have in common."""
+        pieces = Pieces(
+            settings=self._settings, memory=self._memory, rates=self._rates, motor=self._motor,
+            perception=self._perception, assistance=self._assistance,
+            options=self._condition.assistant.numbers if assisted else None,
+            numbers=self._numbers, streams=self._streams,
+        )  # fmt: skip
+        return hold(pieces) if self._compiled else Common(pieces)
 
     def run_episodes(self, episode: int, outcomes: Outcomes, place: int) -> None:
         """An episode of training, then a greedy unassisted one.
@@ -181,8 +180,10 @@ class _Trial:
     def _assisted_episode(self, episode: int) -> tuple[float, int, int, int]:
         """Return, length, events and overrides of an episode of training."""
         condition, limit = self._condition, self._task.episode_limit
+        assisted = episode < condition.episodes
         self._rates = begin_learner(condition.learner, self._memory, episode, condition.episodes)
         self._numbers[:] = 0.0, 1.0, 0.0, episode, 0
+        calls, common = self._calls[assisted], self._common(assisted)
         observation = self._begin(self._streams[ENVIRONMENT], episode)
         total, overrides, events, length, last = 0.0, 0, 0, 0, -1
         while length < limit and not events & _ENDED:
@@ -191,50 +192,36 @@ class _Trial:
                 if self._played == len(self._script.proposed):
                     break
                 script = self._scripted()
+            chosen = calls.act(common, self._rule_memory, observation, last, script)
+            if length == 0:
+                condition.assistant.check_start(float(self._numbers[START_VALUE]))
+            last, executed, undone = chosen[:3]
+            checked_action(executed, self._task.actions)
+            next_observation, reward, event, after = self._environment_step(
+                observation, executed, undone
+            )
             length += 1
-            step, observation = self._step(observation, last, script, length == limit)
-            total += step.reward
-            overrides += step.overridden
-            events |= step.events
-            last = step.proposed
+            happened = event & ~_ENDED if undone else event
+            happened |= LIMIT if length == limit and not happened & _ENDED else 0
+            credited, projected, self._rule_memory, sound = calls.take(
+                common, self._rule_memory, observation, chosen,
+                (next_observation, reward, event, happened),
+            )  # fmt: skip
+            if not sound:
+                raise self._not_finite(episode, length - 1, next_observation, reward)
+            overridden = last != executed or undone
+            if self._rows is not None:
+                probability, coin, tie = chosen[3:]
+                self._rows.append(Step(
+                    episode, observation, last, executed, undone, credited, overridden,
+                    probability, coin, tie, self._assistance.row.copy(), projected, reward,
+                    next_observation, happened,
+                ))  # fmt: skip
+            total += reward
+            overrides += overridden
+            events |= happened
+            observation = after
         return total, length, events, overrides
-
-    def _step(
-        self, observation: np.ndarray, last: int, script: Any, final: bool
-    ) -> tuple[Step, np.ndarray]:
-        """The record of a step of training, and the observation after it."""
-        episode = int(self._numbers[3])
-        assisted = episode < self._condition.episodes
-        calls, learner = self._calls[assisted], self._learner()
-        options = self._condition.assistant.numbers if assisted else None
-        first = self._numbers[4] == 0
-        chosen = calls.act(
-            learner, self._assistance, options, self._rule_memory, observation, self._numbers,
-            last, self._streams, script,
-        )  # fmt: skip
-        if first:
-            self._condition.assistant.check_start(float(self._numbers[START_VALUE]))
-        proposed, executed, undone, probability, coin, tie = chosen
-        checked_action(executed, self._task.actions)
-        next_observation, reward, events, after = self._environment_step(
-            observation, executed, undone
-        )
-        happened = events & ~_ENDED if undone else events
-        happened |= LIMIT if final and not happened & _ENDED else 0
-        credited, projected, self._rule_memory, sound = calls.take(
-            learner, self._perception, self._assistance, options, self._rule_memory, observation,
-            chosen, (next_observation, reward, events, happened), self._numbers, self._streams,
-        )  # fmt: skip
-        if not sound:
-            raise self._not_finite(episode, int(self._numbers[4]), next_observation, reward)
-        step = Step(
-            episode, observation, proposed, executed, undone, credited,
-            proposed != executed or undone, probability, coin, tie, self._assistance.row, projected,
-            reward, next_observation, happened,
-        )  # fmt: skip
-        if self._rows is not None:
-            self._rows.append(step._replace(values=self._assistance.row.copy()))
-        return step, after
 
     def _environment_step(
         self, observation: np.ndarray, executed: int, undone: bool
@@ -258,10 +245,10 @@ class _Trial:
         """Return, length and events of an unassisted episode without exploration or learning."""
         stepper, stream = self._stepper, self._streams[EVALUATION]
         prefer = self._calls[True].preferred
-        learner, actions = (self._settings, self._memory, self._motor), self._task.actions
+        common = self._common(assisted=True)
         limit = self._task.episode_limit
         observation = self._begin(stream, episode)
-        action = prefer(*learner, observation, 0.0, -1, actions, False, stream)
+        action = prefer(common, observation, 0.0, -1, False)
         total, events, length, over = 0.0, 0, 0, False
         while not over:
             observation, reward, event = stepper.step(action)
@@ -269,7 +256,7 @@ class _Trial:
             events |= event
             length += 1
             over = length == limit or bool(event & _ENDED)
-            action = prefer(*learner, observation, reward, action, actions, over, stream)
+            action = prefer(common, observation, reward, action, over)
             if action == NOT_FINITE:
                 raise self._not_finite(episode, length - 1, observation, reward)
         return total, length, events if events & _ENDED else events | LIMIT

@@ -24,7 +24,7 @@ from qbumpers.learners.dispatch import choose, learn, prefer
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
 from qbumpers.networks.network import Layout, values_of
-from qbumpers.random_streams import ASSISTANT, LEARNER, draw
+from qbumpers.random_streams import ASSISTANT, EVALUATION, LEARNER, draw
 from qbumpers.tasks.dynamics import TERMINATED, finite
 
 EARNED, DISCOUNT, START_VALUE, EPISODE, STEP = range(5)
@@ -52,6 +52,44 @@ class NetworkAssistance(NamedTuple):
     row: np.ndarray
     other_rows: np.ndarray
     discount: float
+
+
+class Pieces(NamedTuple):
+    """What the steps of a learner have in common.
+
+    Attributes:
+        settings: of the learner, as numbers.
+        memory: of the learner, changed in place.
+        rates: of the learner, in this episode.
+        motor: how the learner's hand errs, a `Motor` as numbers; or None.
+        perception: as numbers.
+        assistance: its rows are filled by `act`.
+        options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
+            there.
+        numbers: float64 [5], the account of the episode; its start value is filled on the first
+            step.
+        streams: uint64 [4, 4], of the trial.
+    """
+
+    settings: Any
+    memory: Any
+    rates: Any
+    motor: Any
+    perception: Any
+    assistance: NetworkAssistance
+    options: Any
+    numbers: np.ndarray
+    streams: np.ndarray
+
+
+class Common(NamedTuple):
+    """What `act`, `take` and `preferred` are given if they run as plain Python.
+
+    Attributes:
+        content: what compiled code is given held, see `qbumpers.compilation.hold`.
+    """
+
+    content: Pieces
 
 
 class Chosen(NamedTuple):
@@ -105,28 +143,21 @@ def _account(numbers: np.ndarray) -> Account:
 
 @compiled_apart
 def act(
-    learner: Any, assistance: NetworkAssistance, options: Any, rule_memory: Any,
-    observation: np.ndarray, numbers: np.ndarray, last: int, streams: np.ndarray, script: Any,
-) -> tuple[int, int, bool, float, float, float]:  # fmt: skip
+    common: Any, rule_memory: Any, observation: np.ndarray, last: int, script: Any
+) -> tuple[int, int, bool, float, float, float]:
     """The learner proposes an action and the assistant decides.
 
     Args:
-        learner: its settings as numbers, its memory, its rates in this episode, and how its hand
-            errs, a `Motor` or None.
-        assistance: its rows are filled.
-        options: of its rule, as numbers; their type selects it. None if it is not there.
+        common: holds `Pieces`.
         rule_memory: of the assistant's rule.
         observation: float32 [D].
-        numbers: float64 [5], the account of the episode; its start value is filled on the first
-            step.
         last: what the learner proposed on the step before; -1 on the first.
-        streams: uint64 [4, 4], of the trial.
         script: proposed action, coin and tie to be played again; or None.
 
     Returns:
         The fields of `Chosen`.
     """
-    settings, memory, rates, motor = learner
+    settings, memory, rates, motor, _, assistance, options, numbers, streams = common.content
     row, other_rows = assistance.row, assistance.other_rows
     actions, others = len(row), len(other_rows)
     for place in range(others + 1):  # in one loop, so that the network is compiled in once
@@ -157,29 +188,23 @@ def act(
 
 @compiled_apart
 def take(
-    learner: Any, perception: Any, assistance: NetworkAssistance, options: Any, rule_memory: Any,
-    observation: np.ndarray, chosen: Any, outcome: Any, numbers: np.ndarray, streams: np.ndarray,
-) -> tuple[int, float, Any, bool]:  # fmt: skip
+    common: Any, rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any
+) -> tuple[int, float, Any, bool]:
     """The learner learns from a step, and the account and the rule's memory take it in.
 
     Args:
-        learner: as for `act`.
-        perception: as numbers.
-        assistance: as `act` left it.
-        options: as for `act`.
+        common: holds `Pieces`, as `act` left them.
         rule_memory: of the assistant's rule.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
         outcome: the fields of `Outcome`.
-        numbers: float64 [5], the account of the episode.
-        streams: uint64 [4, 4], of the trial.
 
     Returns:
         The action that the learner credits (-1 for none), the projected return of its proposal, the
         rule's memory, and whether reward and observation are finite; if they are not, nothing was
         learned.
     """
-    settings, memory, rates, _ = learner
+    settings, memory, rates, _, perception, assistance, options, numbers, streams = common.content
     proposed, executed, undone, probability, coin, tie = chosen
     next_observation, reward, events, happened = outcome
     account = _account(numbers)
@@ -192,12 +217,12 @@ def take(
     projected = projected_return(account.earned, account.discount, value)
     if not finite(reward, next_observation):
         return experience.action, projected, rule_memory, False
-    step = step_of(
-        situate(account, observation, assistance.row, assistance.other_rows, proposed),
-        Noise(coin, tie), Execution(executed, undone, probability), experience.action, reward,
-        next_observation, happened,
-    )  # fmt: skip
     if options is not None:
+        step = step_of(
+            situate(account, observation, assistance.row, assistance.other_rows, proposed),
+            Noise(coin, tie), Execution(executed, undone, probability), experience.action, reward,
+            next_observation, happened,
+        )  # fmt: skip
         rule_memory = observe(rule_memory, step, options)
     if experience.action >= 0:
         transition = believed(experience, observation, next_observation, events & TERMINATED != 0)
@@ -210,29 +235,24 @@ def take(
 
 
 @compiled_apart
-def preferred(
-    settings: Any, memory: Any, motor: Any, observation: np.ndarray, reward: float,
-    last: int, actions: int, over: bool, stream: np.ndarray,
-) -> int:  # fmt: skip
+def preferred(common: Any, observation: np.ndarray, reward: float, last: int, over: bool) -> int:
     """The learner's greedy action in an unassisted probe.
 
     Args:
-        settings: of the learner, as numbers.
-        memory: of the learner.
-        motor: how the learner's hand errs; or None.
+        common: holds `Pieces`.
         observation: float32 [D].
         reward: that came with it.
         last: the action before it; -1 at the beginning.
-        actions: A.
         over: whether the episode has ended; then the action means nothing.
-        stream: uint64 [4], of the evaluation.
 
     Returns:
         The action; `NOT_FINITE` if the observation or the reward is not finite.
     """
+    settings, memory, _, motor, _, assistance, _, _, streams = common.content
     if not finite(reward, observation):
         return NOT_FINITE
     if over:
         return 0
+    stream = streams[EVALUATION]
     meant = prefer(settings, memory, observation, draw(stream))
-    return move(motor, meant, last, actions, stream)
+    return move(motor, meant, last, len(assistance.row), stream)
