@@ -17,6 +17,7 @@ from qbumpers.compilation import CompilationError, compiled_for_session, is_comp
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
+_originals: dict[type, type] = {}
 
 _FILE = "a file of numbers"
 
@@ -51,7 +52,19 @@ def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], 
         return remade, (name, tuple(instance))
 
     members = {"__slots__": (), "__reduce__": reduce}
-    return type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    fresh = type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    _originals[fresh] = kind
+    return fresh
+
+
+def original_class(kind: type) -> type:
+    """The class that a fresh one was made of; any other class itself."""
+    return _originals.get(kind, kind)
+
+
+def is_written_here(part: Any) -> bool:
+    """Whether a function or class is of this package; so is None, which is nobody's."""
+    return part is None or part.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def compiled_or_plain(

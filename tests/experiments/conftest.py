@@ -2,9 +2,11 @@
 
 import shutil
 
+import gymnasium
 import pytest
 
 from tests.experiments.examples import run_into
+from tests.experiments.own_files import OwnFiles
 
 
 @pytest.fixture(scope="module")
@@ -17,3 +19,11 @@ def folder(whole, tmp_path):
     """A finished run, to be spoiled."""
     shutil.copytree(whole, tmp_path / "run")
     return tmp_path / "run"
+
+
+@pytest.fixture
+def own_files(tmp_path, monkeypatch, own_registry):
+    """Files of a user's own, to be edited and registered."""
+    (tmp_path / "own").mkdir()
+    yield OwnFiles(tmp_path / "own", monkeypatch)
+    gymnasium.registry.pop("own/Walk-v0", None)

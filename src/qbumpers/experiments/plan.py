@@ -8,9 +8,11 @@ from typing import Any, NamedTuple, cast
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experiments.identity import Identity, identity_of
+from qbumpers.experiments.record import Record, RecordedCondition, recorded
 from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
-from qbumpers.simulation import Condition, make_condition
+from qbumpers.simulation import Condition, engine_of, make_condition
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import Task, VectorTask
 from qbumpers.values import (
@@ -44,6 +46,7 @@ class Plan(NamedTuple):
         values: Q* of its assistants.
         named: the conditions as the experiment names them, each with the digest of its content.
         conditions: what the trials of each content need.
+        record: what an output folder notes of the conditions.
     """
 
     experiment: Experiment
@@ -51,6 +54,7 @@ class Plan(NamedTuple):
     values: TabularValues | NetworkValues
     named: list[tuple[NamedCondition, str]]
     conditions: dict[str, Condition]
+    record: Record
 
 
 def make_plan(experiment: Experiment) -> Plan:
@@ -92,7 +96,26 @@ def make_plan(experiment: Experiment) -> Plan:
         conditions[content] = condition
     if not task.states:
         check_expert(cast(VectorTask, task), values)
-    return Plan(experiment, task, values, named, conditions)
+    record = _record(task, named, conditions)
+    return Plan(experiment, task, values, named, conditions, record)
+
+
+def _record(
+    task: Task, named: list[tuple[NamedCondition, str]], conditions: dict[str, Condition]
+) -> Record:
+    """What is noted of conditions; their code is looked at here, once, by the one who asks."""
+    engine = engine_of(task)
+    about = {"revision": engine.REVISION, "precision": engine.PRECISION}
+    found: dict[Any, Identity] = {}
+    noted: list[RecordedCondition] = []
+    for each, content in named:
+        rules, learner = tuple(each.assistant.chain), conditions[content].learner_type
+        key = (*map(id, rules), id(learner))
+        if key not in found:
+            found[key] = identity_of(each.assistant, learner, task, about)
+        noted.append(recorded(each, content, found[key].digest))
+    identities = {identity.digest: identity.parts for identity in found.values()}
+    return Record(noted, task.digest(), identities)
 
 
 def _values(source: str, task: Task) -> TabularValues | NetworkValues:

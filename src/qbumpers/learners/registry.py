@@ -10,7 +10,14 @@ import numpy as np
 from qbumpers.compilation import is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
-from qbumpers.registration import checked_class, compiled_or_plain, fresh_class, sample
+from qbumpers.registration import (
+    checked_class,
+    compiled_or_plain,
+    fresh_class,
+    is_written_here,
+    original_class,
+    sample,
+)
 
 Observes = Literal["states", "vectors"]
 
@@ -25,6 +32,7 @@ class LearnerType:
         observes: "states" by number, or "vectors".
         compiled: whether Numba could compile all of it.
         built_in: whether it belongs to this package, whose compiled code is kept on disk.
+        revision: raised when the numbers that it gives change although its code does not show it.
     """
 
     name: str
@@ -38,6 +46,13 @@ class LearnerType:
     observes: Observes
     compiled: bool
     built_in: bool
+    revision: int = 1
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """What it was registered with: its functions, None for those it lacks, and its settings."""
+        functions = (self.start, self.choose, self.prefer, self.policy, self.learn, self.begin)
+        return (*functions, original_class(self.settings_type))
 
 
 _learners: dict[str, LearnerType] = {}
@@ -55,6 +70,7 @@ def register_learner(
     learn: Callable[..., None],
     begin: Callable[..., Any] | None = None,
     observes: Observes = "states",
+    revision: int = 1,
 ) -> type:
     """Register a learner under a name; it then works in every simulator, in files and in `list`.
 
@@ -78,6 +94,8 @@ def register_learner(
         begin: `(settings, memory, episode, episodes) -> rates`, the numbers of an episode, for
             instance a `qbumpers.learners.interface.Rates`; 0 if there is none.
         observes: "states" by number, or "vectors", float32 [D].
+        revision: to be raised when the learner gives other numbers for a reason that its code does
+            not show; finished trials are then simulated again.
 
     Returns:
         The class of its settings, with which `simulate` takes it: call it with fields by name.
@@ -91,6 +109,7 @@ def register_learner(
         raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
     functions = (start, choose, prefer, policy, learn, begin)
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
+    built_in = built_in and all(map(is_written_here, (settings_type, start, begin)))
     compiled = True
     if not built_in:
         settings_type = fresh_class(settings_type, name, _remade)
@@ -102,7 +121,7 @@ def register_learner(
     start, choose, prefer, policy, learn, begin = functions  # type: ignore[assignment]
     learner = LearnerType(
         name, settings_type, start, choose, prefer, policy, learn, begin, observes, compiled,
-        built_in,
+        built_in, revision,
     )  # fmt: skip
     _learners[name] = learner
     _learners_by_settings[settings_type] = learner

@@ -26,6 +26,11 @@ from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
 from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
+REVISION = 1
+"""Raised when trials give other numbers by anything that is no rule, learner or task."""
+
+PRECISION = "float32"
+
 _ENDED = TERMINATED | TRUNCATED
 
 _SESSION = {f: compiled_for_session(uncompiled(f)) for f in (act, take, preferred)}

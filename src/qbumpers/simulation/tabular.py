@@ -15,6 +15,12 @@ from qbumpers.simulation.loops import (
 )
 from qbumpers.simulation.outcomes import Script, Simulation, Sinks, StateCounts, room_for_steps
 
+REVISION = 1
+"""Raised when trials give other numbers by anything that is no rule, learner or task: the loops,
+the streams, the account of an episode, perception, motor noise, forgetting."""
+
+PRECISION = "float64"
+
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     """Simulate trials of a condition, one after another in compiled code."""

@@ -71,10 +71,11 @@ def run(
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    return _engine(condition.task).run_block(condition, trials, seed)
+    return engine_of(condition.task).run_block(condition, trials, seed)
 
 
-def _engine(task: Task) -> Any:
+def engine_of(task: Task) -> Any:
+    """The module that simulates a task, with its `REVISION` and `PRECISION`."""
     return tabular if task.states else deep
 
 
@@ -109,7 +110,7 @@ def record(
     if script is not None:
         _check_script(script, condition.task.actions)
     trials = _checked_trials(range(trial, trial + 1), seed)
-    return _engine(condition.task).record(condition, trials, seed, script)
+    return engine_of(condition.task).record(condition, trials, seed, script)
 
 
 def _checked_trials(trials: int | range, seed: int) -> range:
