@@ -21,6 +21,7 @@ from qbumpers.registration import (
     as_numbers,
     checked_class,
     compiled_or_plain,
+    files_in,
     fresh_class,
     is_written_here,
     original_class,
@@ -131,6 +132,12 @@ class Assistant:
         """The options as rules take them: texts and files as numbers, `of` as options."""
         own = self.options._replace(of=self.of.numbers) if self.of else self.options
         return as_numbers(own)
+
+    @property
+    def files(self) -> dict[str, np.ndarray]:
+        """What is in the files that its options and those of `of` name, float64 [N, K] by name."""
+        own = self.options._replace(of=self.of.options) if self.of else self.options
+        return files_in(own, self.numbers)
 
     @property
     def needs(self) -> frozenset[str]:

@@ -3,9 +3,12 @@
 Results can so be read by programs that know neither the rules nor the learners.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import NamedCondition
@@ -47,12 +50,14 @@ class Record(NamedTuple):
     Attributes:
         conditions: in the order of the experiment.
         task: digest of the task.
+        values: digest of Q*.
         identities: the parts of every identity that some trial in the folder was simulated with, by
             digest.
     """
 
     conditions: Sequence[RecordedCondition]
     task: str = ""
+    values: str = ""
     identities: Mapping[str, Mapping[str, Any]] = {}
 
     def by_id(self) -> dict[str, RecordedCondition]:
@@ -67,6 +72,12 @@ class Record(NamedTuple):
         """The record as JSON."""
         fields = {**self._asdict(), "conditions": [c._asdict() for c in self.conditions]}
         return (json.dumps(fields, indent=1) + "\n").encode()
+
+
+def file_name(numbers: np.ndarray) -> str:
+    """The name under which an output folder keeps the numbers of a file, float64 [N, K]."""
+    content = str(numbers.shape).encode() + numbers.tobytes()
+    return f"files/{hashlib.sha256(content).hexdigest()[:16]}.npy"
 
 
 def decoded_record(content: bytes | None) -> Record | None:

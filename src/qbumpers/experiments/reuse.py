@@ -6,7 +6,7 @@ again what it was.
 """
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from qbumpers.experiments.cells import Cell
@@ -83,7 +83,7 @@ def again(
     record: Record,
     before: Record | None,
     cells: Mapping[str, Sequence[Cell]],
-    stale: Mapping[str, Sequence[CellFile]],
+    stale: Callable[[str], Sequence[CellFile]],
     trials: int,
 ) -> list[str]:
     """Why finished trials are simulated again.
@@ -92,7 +92,7 @@ def again(
         record: of the conditions.
         before: what the folder noted until now; None if that is nothing.
         cells: that are used, by their content.
-        stale: files of cells that are not.
+        stale: finds the files of cells that are not, by their content.
         trials: that are wanted of each condition.
 
     Returns:
@@ -101,15 +101,26 @@ def again(
     then = before.by_id() if before else {}
     found: dict[str, dict[str, int]] = {}
     for each in record.conditions:
-        files = stale[each.content]
+        known = then.get(each.condition)
+        renewed = [] if known is None else _renewed(known, each)
+        files = stale(known.content if known and renewed else each.content)
         there = _numbers(f.cell for f in files) - _numbers(cells[each.content])
         number = sum(trial < trials for trial in there)
         if number:
-            reason = _reason(each, then.get(each.condition), files, record)
+            reason = " and ".join(renewed) or _reason(each, known, files, record)
             found.setdefault(reason, {})[each.condition] = number
     return [
         f"{_named(list(numbers))}: {reason}; {_counted(sum(numbers.values()))} simulated again"
         for reason, numbers in found.items()
+    ]
+
+
+def _renewed(then: RecordedCondition, now: RecordedCondition) -> list[str]:
+    """What is said of files that hold something else than they did."""
+    return [
+        f"the file {name} changed since they were simulated"
+        for name, kept in now.files.items()
+        if then.content != now.content and then.files.get(name, kept) != kept
     ]
 
 

@@ -68,7 +68,7 @@ def run_experiment(
     backend = backend or ThisMachine()
     design = plan.experiment
     with open_store(folder, design, plan.record) as store:
-        store.write_values(plan.values)
+        store.write_inputs(plan.values, plan.files)
         found = store.survey(design.trials)
         cells = {
             content: tiles(content, design.trials, design.trials_a_cell(), found.cells[content])

@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import polars as pl
 import tomli_w
 
@@ -131,9 +132,13 @@ class Store:
             self._files |= {(file.cell, file.kind): file.name for file in whole}
             cells[content] = whole_cells(whole, self._tables)
             stale[content] = [file for file in files if file not in usable]
+
+        def stale_of(content: str) -> list[CellFile]:
+            return stale[content] if content in stale else cell_files(self._folder, content)
+
         for name in damaged:
             self._folder.remove(name)
-        changed = again(self._record, self._before, cells, stale, trials)
+        changed = again(self._record, self._before, cells, stale_of, trials)
         return Survey(cells, damaged, changed)
 
     def _is_whole(self, file: CellFile) -> bool:
@@ -146,9 +151,15 @@ class Store:
             self._folder.write(name, content)
             self._files[cell, kind] = name
 
-    def write_values(self, values: TabularValues | NetworkValues) -> None:
-        """Keep the assistants' Q*."""
+    def write_inputs(
+        self, values: TabularValues | NetworkValues, files: Mapping[str, np.ndarray]
+    ) -> None:
+        """Keep the assistants' Q*, and what is in files that conditions name, by `file_name`."""
         self._folder.write(VALUES, values.encoded())
+        for name, numbers in files.items():
+            buffer = io.BytesIO()
+            np.save(buffer, numbers)
+            self._folder.write(name, buffer.getvalue())
 
     def assemble(self, cells: Mapping[str, Sequence[Cell]]) -> None:
         """Write the tables of the whole experiment from its finished cells.
@@ -253,6 +264,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
         found, before = _read_design(place), decoded_record(place.read(CONDITIONS))
         if found is not None:
             _check_same(place, found, experiment)
+            _check_inputs(place, before, experiment, record)
             if _renamed(found, before, experiment, record):
                 for table in tables_of(experiment):  # or a stopped run would pass them off
                     place.remove(table)
@@ -376,6 +388,39 @@ def _check_same(folder: Folder, found: Experiment, experiment: Experiment) -> No
         raise RequestError(
             f"output folder {folder} holds another experiment ({details}); choose another folder"
         )
+
+
+def _check_inputs(
+    folder: Folder, before: Record | None, experiment: Experiment, record: Record
+) -> None:
+    """Refuse Q* or a task that are others by now under the name that they had."""
+    changed = []
+    if before is not None and before.task not in ("", record.task):
+        changed.append(f"task {experiment.task.name!r} does not behave as it did")
+    with contextlib.suppress(RequestError):  # what is damaged is written anew
+        kept = decoded_values(folder.read(VALUES) or b"", VALUES)
+        if kept.digest() != record.values:
+            changed.append(f"values = {experiment.values!r} are not those in its {VALUES}")
+    if changed:
+        raise RequestError(
+            f"output folder {folder} holds another experiment ({'; '.join(changed)}); choose "
+            "another folder"
+        )
+
+
+def kept_files(folder: str | Path, each: RecordedCondition) -> dict[str, np.ndarray]:
+    """What was in the files that a condition named when it was run.
+
+    Args:
+        folder: of the results.
+        each: the condition.
+
+    Returns:
+        Float64 [N, K] by the name that the experiment has for a file; nothing from old folders.
+    """
+    place = open_folder(folder)
+    contents = {name: place.read(kept) for name, kept in each.files.items()}
+    return {name: np.load(io.BytesIO(found)) for name, found in contents.items() if found}
 
 
 def _renamed(

@@ -133,7 +133,7 @@ def tune(
     """
     _check(plan, floor, confidence)
     with quiet(), open_store(folder, plan.experiment, plan.record) as store:
-        store.write_values(plan.values)
+        store.write_inputs(plan.values, plan.files)
         trials = Trials(plan, store, backend or ThisMachine(), report)
         verdicts, confidences = _decide(trials, floor, confidence)
         contenders = [
