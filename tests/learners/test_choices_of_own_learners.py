@@ -40,7 +40,8 @@ def learn(settings, memory, transition, rates, stream):
 def test_it_is_told_when_it_is_registered():
     with pytest.warns(UserWarning, match="choose returns .*, not a whole number"):
         kind = register_learner(
-            "may-not-choose", Settings, start=start, choose=choose, prefer=prefer, policy=policy,
-            learn=learn,
+            "may-not-choose", Settings, start=start,
+            choose=choose,  # pyright: ignore[reportArgumentType] - this is what is refused
+            prefer=prefer, policy=policy, learn=learn,
         )  # fmt: skip
     assert not learner_for_settings(kind).compiled

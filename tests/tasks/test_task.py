@@ -8,7 +8,8 @@ import pytest
 from gymnasium import spaces
 
 from qbumpers import RequestError
-from qbumpers.tasks import CliffWalking, cliff_walking, make_task
+from qbumpers.tasks import CliffWalking, VectorTask, cliff_walking, make_task
+from tests.narrowing import of_kind
 from tests.tasks.examples import random_task
 
 LAKE = {"name": "FrozenLake-v1", "discount": 0.99, "is_slippery": True}
@@ -135,7 +136,7 @@ def test_what_is_stated_of_a_vector_task_is_in_its_digest(cart):
 
 
 def test_what_follows_from_a_tasks_name_is_in_its_digest_only_if_it_is_changed():
-    lander = make_task("lunar-lander")
+    lander = of_kind(VectorTask, make_task("lunar-lander"))
     changes = [
         {"no_op": -1},
         {"action_distance": None},
