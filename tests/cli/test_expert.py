@@ -3,7 +3,6 @@
 import pytest
 
 from qbumpers import load_values, solve
-from qbumpers.cli import expert as command
 from qbumpers.experts import correcting, visiting
 from qbumpers.tasks import make_task
 from qbumpers.values import NetworkValues, TabularValues
@@ -122,7 +121,6 @@ def test_the_help_states_the_rule_of_choice(call):
     said = " ".join(output.split())
     for part in ("2% random actions", "10% random actions", "after 50 random actions"):
         assert part in said
-    assert command.expert.__doc__
 
 
 def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_path):
