@@ -28,7 +28,7 @@ from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
 _ENDED = TERMINATED | TRUNCATED
 
-_SESSION = {f: compiled_for_session(uncompiled(f)) for f in (act, take, preferred)}
+_SESSION = {f: compiled_for_session(uncompiled(f)) for f in (hold, act, take, preferred)}
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
@@ -133,12 +133,7 @@ class _Trial:
 
     def _entered(self, assisted: bool) -> _Calls:
         """The calls of a step, compiled unless the rule or the learner cannot be."""
-        assistant, learner = self._condition.assistant, self._condition.learner_type
-        calls = (act, take, preferred)
-        if not (assistant.built_in and learner.built_in):
-            calls = tuple(_SESSION[each] for each in calls)
-        if not self._compiled:
-            calls = tuple(map(uncompiled, calls))
+        calls = tuple(map(self._kind, (act, take, preferred)))
         begun = (self._common(), self._options(assisted), self._rule_memory)
         observation = np.zeros(self._task.observation_size, np.float32)
         script = None if self._script is None else (0, 0.0, 0.0)
@@ -149,6 +144,13 @@ class _Trial:
             entered(calls[2], begun[0], observation, 0.0, 0, True),
         )
 
+    def _kind(self, function: Any) -> Any:
+        """A function of a step: compiled with the package, in this process, or not at all."""
+        if not self._compiled:
+            return uncompiled(function)
+        ours = self._condition.assistant.built_in and self._condition.learner_type.built_in
+        return function if ours else _SESSION[function]
+
     def _common(self) -> Any:
         """What the steps of an episode have in common."""
         pieces = Pieces(
@@ -156,7 +158,7 @@ class _Trial:
             perception=self._perception, assistance=self._assistance,
             numbers=self._numbers, streams=self._streams,
         )  # fmt: skip
-        return hold(pieces) if self._compiled else Common(pieces)
+        return self._kind(hold)(pieces) if self._compiled else Common(pieces)
 
     def _options(self, assisted: bool) -> Any:
         return self._condition.assistant.numbers if assisted else None
