@@ -8,6 +8,7 @@ from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import (
     CompilationError,
     is_of_package,
@@ -330,16 +331,16 @@ def compile_rule(rule: Rule, kind: str) -> None:
 
 def _compile_for(kind: str, decide: Any, start: Any, observe: Any, options_type: type) -> None:
     """Compile a rule for the types that every host passes."""
-    state = 0 if kind == "states" else np.zeros(1, np.float32)
-    values = np.zeros(2)
-    situation = type_of(Situation(state, values, np.zeros((0, 2)), 0, 0.0, 1.0, 0.0, 0, 0))
+    state = 0 if kind == "states" else read_only(np.zeros(1, np.float32))
+    values, others = read_only((np.zeros(2), np.zeros((0, 2))))
+    situation = type_of(Situation(state, values, others, 0, 0.0, 1.0, 0.0, 0, 0))
     noise = type_of(Noise(0.0, 0.0))
     nested = sample(_rules["none"].options_type) if "none" in _rules else None
     options = type_of(sample(options_type, nested))
     arguments: tuple[Any, ...] = (situation, noise, options)
     if start is not None:
         dynamics = _example_dynamics() if kind == "states" else None
-        model = type_of(Model(1, 0, 2, -1, 1.0, dynamics, np.zeros((2, 2))))
+        model = type_of(read_only(Model(1, 0, 2, -1, 1.0, dynamics, np.zeros((2, 2)))))
         memory = result_type(start, options, model)
         step = type_of(
             Step(0, state, 0, 0, False, 0, False, 0.0, 0.0, 0.0, values, 0.0, 0.0, state, 0)

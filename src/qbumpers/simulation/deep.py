@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from qbumpers.compilation import compiled_for_session, entered, hold, uncompiled
-from qbumpers.decisions import Step, checked_action
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
 from qbumpers.learners.dispatch import start as start_learner
@@ -200,7 +200,6 @@ class _Trial:
             if length == 0:
                 condition.assistant.check_start(float(self._numbers[START_VALUE]))
             last, executed, undone = chosen[:3]
-            checked_action(executed, self._task.actions)
             next_observation, reward, event, after = self._environment_step(
                 observation, executed, undone
             )
