@@ -25,8 +25,9 @@ class Painter:
 
         height = round(display.height) if height is None else height
         scale = height / display.height
+        size = round(display.width * scale) * _SMOOTH, height * _SMOOTH
         self._scale, self._scene = scale * _SMOOTH, display.scene
-        self._backdrop = Image.new("RGB", (round(display.width * scale) * _SMOOTH, height * _SMOOTH))
+        self._backdrop = Image.new("RGB", size)
         self._draw(self._backdrop, display.backdrop)
 
     def picture(self, state: Any, step: Step | None = None) -> np.ndarray:
