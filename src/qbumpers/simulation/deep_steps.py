@@ -64,8 +64,6 @@ class Pieces(NamedTuple):
         motor: how the learner's hand errs, a `Motor` as numbers; or None.
         perception: as numbers.
         assistance: its rows are filled by `act`.
-        options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
-            there.
         numbers: float64 [5], the account of the episode; its start value is filled on the first
             step.
         streams: uint64 [4, 4], of the trial.
@@ -77,7 +75,6 @@ class Pieces(NamedTuple):
     motor: Any
     perception: Any
     assistance: NetworkAssistance
-    options: Any
     numbers: np.ndarray
     streams: np.ndarray
 
@@ -143,12 +140,14 @@ def _account(numbers: np.ndarray) -> Account:
 
 @compiled_apart
 def act(
-    common: Any, rule_memory: Any, observation: np.ndarray, last: int, script: Any
+    common: Any, options: Any, rule_memory: Any, observation: np.ndarray, last: int, script: Any
 ) -> tuple[int, int, bool, float, float, float]:
     """The learner proposes an action and the assistant decides.
 
     Args:
         common: holds `Pieces`.
+        options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
+            there. (By itself: compilation leaves out what is not there only for arguments.)
         rule_memory: of the assistant's rule.
         observation: float32 [D].
         last: what the learner proposed on the step before; -1 on the first.
@@ -157,7 +156,7 @@ def act(
     Returns:
         The fields of `Chosen`.
     """
-    settings, memory, rates, motor, _, assistance, options, numbers, streams = common.content
+    settings, memory, rates, motor, _, assistance, numbers, streams = common.content
     row, other_rows = assistance.row, assistance.other_rows
     actions, others = len(row), len(other_rows)
     for place in range(others + 1):  # in one loop, so that the network is compiled in once
@@ -188,12 +187,13 @@ def act(
 
 @compiled_apart
 def take(
-    common: Any, rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any
+    common: Any, options: Any, rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any
 ) -> tuple[int, float, Any, bool]:
     """The learner learns from a step, and the account and the rule's memory take it in.
 
     Args:
         common: holds `Pieces`, as `act` left them.
+        options: as for `act`.
         rule_memory: of the assistant's rule.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
@@ -204,7 +204,7 @@ def take(
         rule's memory, and whether reward and observation are finite; if they are not, nothing was
         learned.
     """
-    settings, memory, rates, _, perception, assistance, options, numbers, streams = common.content
+    settings, memory, rates, _, perception, assistance, numbers, streams = common.content
     proposed, executed, undone, probability, coin, tie = chosen
     next_observation, reward, events, happened = outcome
     account = _account(numbers)
@@ -248,7 +248,7 @@ def preferred(common: Any, observation: np.ndarray, reward: float, last: int, ov
     Returns:
         The action; `NOT_FINITE` if the observation or the reward is not finite.
     """
-    settings, memory, _, motor, _, assistance, _, _, streams = common.content
+    settings, memory, _, motor, _, assistance, _, streams = common.content
     if not finite(reward, observation):
         return NOT_FINITE
     if over:
