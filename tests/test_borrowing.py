@@ -40,6 +40,19 @@ def sum_and_double(table, width):
 
 
 @compiled_for_session
+def sums_and_double(tables, width):
+    """The sums of the rows of every table; each row is doubled in place."""
+    tables = borrow(tables)
+    sums = np.zeros(tables.shape[:2])
+    for index in range(len(tables)):
+        values = row(tables, index, width)
+        for place in range(len(values)):
+            sums[index, place] = values[place].sum()
+            values[place] *= 2
+    return sums
+
+
+@compiled_for_session
 def is_nothing(thing):
     return borrow(thing) is None
 
@@ -67,6 +80,15 @@ def test_a_row_is_a_view_of_the_right_part_of_its_table(as_host_runs_it, shape):
     sums = as_host_runs_it(sum_and_double)(table, (0,) * shape[1])
     assert np.array_equal(sums, before.sum(axis=1))
     assert np.array_equal(table, 2 * before)
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (5, 3, 2), (48, 2, 4), (3, 0, 4)])
+def test_rows_are_a_view_of_the_right_part_of_their_tables(as_host_runs_it, shape):
+    tables = np.random.default_rng(5).integers(-9, 9, shape).astype(float)
+    before = tables.copy()
+    sums = as_host_runs_it(sums_and_double)(tables, (0,) * shape[2])
+    assert np.array_equal(sums, before.sum(axis=2))
+    assert np.array_equal(tables, 2 * before)
 
 
 def test_nothing_can_be_borrowed(as_host_runs_it):

@@ -289,20 +289,14 @@ def _checked_network(
             f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
+    found = (values.inputs, values.actions)
+    if found != (task.observation_size, task.actions):
+        raise RequestError(
+            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
+            f"{task.name} needs {task.observation_size} and {task.actions}"
+        )
+    # They have the shape of Q*, or there would be no such values.
     others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    for network in (values, *others):
-        found = (network.inputs, network.actions)
-        if found != (task.observation_size, task.actions):
-            raise RequestError(
-                f"values of {network.task}: a network of {found[0]} inputs and {found[1]} actions; "
-                f"task {task.name} needs {task.observation_size} and {task.actions}"
-            )
-    for network in others:
-        if network.layout != values.layout:
-            raise RequestError(
-                f"values of {values.task}: further values must come from a network of the same "
-                "shape as Q*"
-            )
     return values, others, values.discount
 
 

@@ -32,7 +32,7 @@ _SESSION = {f: compiled_for_session(uncompiled(f)) for f in (hold, act, take, pr
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    """Simulate trials of a condition, one after another on one core."""
+    """Simulate trials: `run_block` of `qbumpers.simulation.trials.Engine`."""
     outcomes = outcome_room(condition, len(trials))
     _run_trials(condition, trials, seed, outcomes, None, None)
     return Simulation(outcomes, None)
@@ -45,15 +45,7 @@ def record(
     script: Script | None,
     interpreted: bool = False,
 ) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more.
-
-    Args:
-        condition: to simulate.
-        trials: the one trial.
-        seed: of the experiment.
-        script: to be played again; or None.
-        interpreted: whether to call the pieces of a step as plain Python, to be compared with.
-    """
+    """Every step of training of one trial: `record` of `qbumpers.simulation.trials.Engine`."""
     rows: list[Step] = []
     _run_trials(condition, trials, seed, outcome_room(condition, 1), rows, script, interpreted)
     kinds = Step(

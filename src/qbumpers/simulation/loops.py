@@ -10,7 +10,7 @@ import numpy as np
 
 from qbumpers.assistants.dispatch import decide, observe, undoes
 from qbumpers.assistants.dispatch import start as start_rule
-from qbumpers.borrowing import borrow, hold, row, rows
+from qbumpers.borrowing import borrow, hold, row
 from qbumpers.compilation import compiled, compiled_for_session, inlined, uncompiled
 from qbumpers.decisions import (
     Execution,
@@ -183,7 +183,7 @@ def _assisted_episode(
         )
         situation = situate(
             account, _seen(assistance.seen, state), row(assistance.values, state, width),
-            rows(assistance.others, state, width), proposed,
+            row(assistance.others, state, width), proposed,
         )  # fmt: skip
         execution = Execution(proposed, False, 0.0)
         if when.assisted:

@@ -18,7 +18,7 @@ from qbumpers.simulation.outcomes import Script, Simulation, Sinks, StateCounts,
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    """Simulate trials of a condition, one after another in compiled code."""
+    """Simulate trials: `run_block` of `qbumpers.simulation.trials.Engine`."""
     outcomes = outcome_room(condition, len(trials))
     counts = StateCounts(*(np.zeros(condition.task.states, np.int64) for _ in range(3)))
     _call_loops(condition, trials, seed, Sinks(outcomes, counts, None, None))
@@ -32,15 +32,7 @@ def record(
     script: Script | None,
     interpreted: bool = False,
 ) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more.
-
-    Args:
-        condition: to simulate.
-        trials: the one trial.
-        seed: of the experiment.
-        script: to be played again; or None.
-        interpreted: whether to run the loops as plain Python, to be compared with.
-    """
+    """Every step of training of one trial: `record` of `qbumpers.simulation.trials.Engine`."""
     most = (condition.episodes + condition.retention) * condition.task.episode_limit
     steps = room_for_steps(most, np.zeros((), np.int64), condition.task.actions)
     sinks = Sinks(outcome_room(condition, 1), None, steps, script)
