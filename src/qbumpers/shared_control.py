@@ -1,7 +1,7 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -134,7 +134,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         )  # fmt: skip
         return observation, {**info, RECORD: first._asdict()}
 
-    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
 
         Raises:

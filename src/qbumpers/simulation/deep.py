@@ -23,7 +23,6 @@ from qbumpers.simulation.deep_steps import (
     take,
 )
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
-from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
 _ENDED = TERMINATED | TRUNCATED
@@ -103,7 +102,7 @@ class _Trial:
         script: Script | None,
         interpreted: bool,
     ) -> None:
-        task = cast(VectorTask, condition.task)
+        task = condition.task
         self._condition, self._task = condition, task
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks.checking import normalised_rows
@@ -16,11 +17,11 @@ Table = Mapping[int, Mapping[int, list[tuple[float, int, float, bool]]]]
 
 
 def outcomes_of_arrays(
-    transition: np.ndarray,
-    reward: np.ndarray,
-    terminal: np.ndarray,
-    success: np.ndarray | None,
-    crash: np.ndarray | None,
+    transition: ArrayLike,
+    reward: ArrayLike,
+    terminal: ArrayLike,
+    success: ArrayLike | None,
+    crash: ArrayLike | None,
 ) -> dict[str, np.ndarray | None]:
     """The outcomes [S, A, K] of each action; see `TabularTask.from_arrays`."""
     transition = np.asarray(transition, np.float64)
@@ -49,7 +50,7 @@ def outcomes_of_arrays(
     }
 
 
-def start_distribution(start: np.ndarray | int, states: int) -> np.ndarray:
+def start_distribution(start: ArrayLike, states: int) -> np.ndarray:
     """Distribution of the first state, float64 [S], if it may be given as one state."""
     if np.ndim(start):
         return np.asarray(start, np.float64)
@@ -142,7 +143,7 @@ def description_of(environment: Any, episode_limit: int | None) -> dict[str, Any
     }  # fmt: skip
 
 
-def _state_flags(name: str, flags: np.ndarray, states: int) -> np.ndarray:
+def _state_flags(name: str, flags: ArrayLike, states: int) -> np.ndarray:
     array = np.asarray(flags, np.bool_)
     if array.shape != (states,):
         raise RequestError(
