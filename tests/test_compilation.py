@@ -164,6 +164,9 @@ def test_a_function_that_is_not_compiled_is_entered_as_it_is():
     assert compilation.entered(plain, np.zeros(2)) is plain
 
 
+hold = compilation.compiled_for_session(compilation.uncompiled(compilation.hold))
+
+
 @compilation.compiled_for_session
 def _grow(common, amount):
     pair, numbers = common.content
@@ -173,7 +176,7 @@ def _grow(common, amount):
 
 def test_held_values_are_entered_with_and_stay_the_same_arrays():
     numbers = np.array([1.0, 2.0])
-    common = compilation.hold((Pair(3, 0.5), numbers))
+    common = hold((Pair(3, 0.5), numbers))
     entry = compilation.entered(_grow, common, 0.0)
     assert entry(common, 4.0) == 3 + 7
     numbers[1] = 10.0
@@ -182,7 +185,7 @@ def test_held_values_are_entered_with_and_stay_the_same_arrays():
 
 
 def test_held_values_outlive_the_names_of_their_arrays():
-    common = compilation.hold((Pair(1, 0.5), np.full(1000, 2.0)))
+    common = hold((Pair(1, 0.5), np.full(1000, 2.0)))
     others = [np.full(1000, 9.0) for _ in range(50)]  # would reuse memory that was given back
     assert len(others) == 50
     assert _grow(common, 0.0) == 1 + 2000

@@ -44,9 +44,11 @@ def test_tables_of_a_learner_reach_its_condition():
     ("learners", "apart"),
     [
         ([{"perception": ["observant", {"notices": 0.3}]}],
-         ["perception=observant", "perception=0.3..executed..0"]),
+         ["perception=observant", "perception={notices=0.3}"]),
         ([{"perception": {"notices": [0.3, 0.5], "penalty": 0.5}}],
-         ["perception=0.3..executed..0.5", "perception=0.5..executed..0.5"]),
+         ["perception={notices=0.3,penalty=0.5}", "perception={notices=0.5,penalty=0.5}"]),
+        ([{"perception": [{}, {"credits": "nothing"}]}],
+         ["perception={notices=1}", "perception={notices=1,credits=nothing}"]),
         ([{"motor": [{"slip": [0.1, 0.2]}, {"lag": 0.3}]}],
          ["motor=0.1..0", "motor=0.2..0", "motor=0..0.3"]),
         ([{}, {"motor": {"slip": 0.1}}], ["motor=0..0", "motor=0.1..0"]),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qbumpers import RequestError
+from qbumpers import RequestError, solve
 from qbumpers.tasks import TabularTask
 from tests.narrowing import present
 from tests.tasks.examples import outcomes, random_task
@@ -210,3 +210,45 @@ def test_the_digest_changes_with_the_behaviour(changes):
 def test_success_and_crash_have_different_digests():
     flags = [False, True]
     assert from_arrays(success=flags).digest() != from_arrays(crash=flags).digest()
+
+
+@pytest.mark.parametrize("states", [3, 7, 100])
+def test_probabilities_rounded_to_float32_are_those_that_were_meant(states):
+    generator = np.random.default_rng(states)
+    exact = generator.dirichlet(np.ones(states), (states, 2))
+    rounded = exact.astype(np.float32)
+    assert (rounded.sum(axis=2, dtype=np.float64) != 1).any()
+    reward = generator.normal(size=(states, 2))
+    terminal = np.arange(states) == states - 1
+    made = [
+        TabularTask.from_arrays(each, reward, terminal, 0, discount=0.99, episode_limit=10)
+        for each in (exact, rounded)
+    ]
+    np.testing.assert_allclose(made[1].probability.sum(axis=2), 1, rtol=1e-12)
+    values = [np.array([solve(task)(state) for state in range(states)]) for task in made]
+    np.testing.assert_allclose(values[1], values[0], atol=1e-4)
+
+
+def test_a_sum_is_shown_with_all_its_digits():
+    transition = np.array([[[0.999998, 0.0], [1.0, 0.0]], [[0.0, 1.0], [0.0, 1.0]]])
+    with pytest.raises(RequestError, match=r"sums to 0\.999998; it must sum to 1"):
+        from_arrays(transition=transition)
+
+
+def test_a_fraction_is_no_next_state_of_a_table():
+    table = {**TABLE, 1: {**TABLE[1], 0: [(1.0, 0.5, 0.0, False)]}}
+    with pytest.raises(RequestError, match=r"table\[1\]\[0\]: next state = 0\.5; a whole number"):
+        from_table(table)
+
+
+def test_fractions_are_no_next_states():
+    task = random_task(0, 3, 2)
+    with pytest.raises(RequestError, match="next_state holds float64; whole numbers are needed"):
+        dataclasses.replace(task, next_state=task.next_state + 0.5)
+
+
+@pytest.mark.parametrize("field", ["terminated", "success", "crash"])
+def test_a_half_truth_is_refused(field):
+    task = random_task(0, 3, 2)
+    with pytest.raises(RequestError, match=f"{field} must hold nothing but true and false"):
+        dataclasses.replace(task, **{field: np.full(task.next_state.shape, 0.5)})

@@ -79,11 +79,27 @@ class HalfEcho(Echo):
         return self.before
 
 
-class Negated(wrappers.TransformObservation):
-    """A wrapper of a user, made from one of Gymnasium's."""
+class RunningSum(wrappers.TransformObservation):
+    """A wrapper of a user, derived from one of Gymnasium's, with a state of its own."""
 
     def __init__(self, env):
-        super().__init__(env, lambda observation: -observation, env.observation_space)
+        super().__init__(env, self._added, env.observation_space)
+        self.sum = np.zeros(1, np.float32)
+
+    def _added(self, observation):
+        self.sum = self.sum + observation
+        return self.sum
+
+
+class UndoableRunningSum(RunningSum):
+    """The same with the two methods."""
+
+    def snapshot(self):
+        return self.sum, undo_of(self.env)[0]()
+
+    def restore(self, snapshot):
+        self.sum = snapshot[0]
+        undo_of(self.env)[1](snapshot[1])
 
 
 HARMLESS = [
@@ -96,7 +112,12 @@ HARMLESS = [
     functools.partial(
         wrappers.TransformAction, func=lambda action: 1 - action, action_space=spaces.Discrete(2)
     ),
-    Negated,
+    functools.partial(
+        wrappers.TransformObservation,
+        func=lambda observation: -observation,
+        observation_space=Counter.observation_space,
+    ),
+    UndoableRunningSum,
     UndoableEcho,
 ]
 
@@ -131,6 +152,7 @@ def test_a_step_is_taken_back_through_several_wrappers():
     ("wrap", "name"),
     [
         (Echo, "Echo"),
+        (RunningSum, "RunningSum"),
         (HalfEcho, "HalfEcho"),
         (functools.partial(wrappers.DelayObservation, delay=1), "DelayObservation"),
         (functools.partial(wrappers.FrameStackObservation, stack_size=2), "FrameStackObservation"),

@@ -22,50 +22,59 @@ if TYPE_CHECKING:
     from qbumpers.tasks import Task
 
 
+Check = Annotated[
+    Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
+]
+Figures = Annotated[
+    Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
+]
+Out = Annotated[
+    Path | None, typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE")
+]
+Corrected = Annotated[
+    Path | None,
+    typer.Option(
+        help="Also correct the values by what they achieve where learners go, into this file.",
+        metavar="FILE",
+    ),
+]
+Discount = Annotated[
+    float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
+]
+Seeds = Annotated[
+    int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
+]
+Steps = Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)]
+Activation = Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")]
+Hidden = Annotated[str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")]
+LearningRate = Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")]
+RandomStart = Annotated[
+    int,
+    typer.Option(
+        "--random-start",
+        "--opening",
+        help="Random actions before each episode of training.",
+        metavar="N",
+    ),
+]
+
+
 @application.command()
 def expert(
     task: Annotated[
         str, typer.Argument(help="Name of a task, or of a Gymnasium environment.", metavar="TASK")
     ],
-    check: Annotated[
-        Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE"),
-    ] = None,
-    corrected: Annotated[
-        Path | None,
-        typer.Option(
-            help="Also correct the values by what they achieve where learners go, into this file.",
-            metavar="FILE",
-        ),
-    ] = None,
-    discount: Annotated[
-        float | None,
-        typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER"),
-    ] = None,
-    seeds: Annotated[
-        int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
-    ] = 10,
-    steps: Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)] = 400_000,
-    activation: Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")] = "tanh",
-    hidden: Annotated[
-        str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")
-    ] = "64,64",
-    learning_rate: Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")] = 5e-4,
-    random_start: Annotated[
-        int,
-        typer.Option(
-            "--random-start",
-            "--opening",
-            help="Random actions before each episode of training.",
-            metavar="N",
-        ),
-    ] = 50,
+    check: Check = None,
+    figures: Figures = None,
+    out: Out = None,
+    corrected: Corrected = None,
+    discount: Discount = None,
+    seeds: Seeds = 10,
+    steps: Steps = 400_000,
+    activation: Activation = "tanh",
+    hidden: Hidden = "64,64",
+    learning_rate: LearningRate = 5e-4,
+    random_start: RandomStart = 50,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 

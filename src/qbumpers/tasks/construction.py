@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.checking import check_rows
+from qbumpers.tasks.checking import normalised_rows
 
 Judge = Callable[[int, int, int, float, bool], bool]
 """`(state, action, next_state, reward, terminated) -> bool`."""
@@ -27,7 +27,7 @@ def outcomes_of_arrays(
     transition = np.asarray(transition, np.float64)
     if transition.ndim != 3 or transition.shape[0] != transition.shape[2]:
         raise RequestError(f"transition has shape {transition.shape}; [S, A, S] is needed")
-    check_rows("transition", transition)
+    transition = normalised_rows("transition", transition)
     states, actions, _ = transition.shape
     outcomes = max(1, int((transition > 0).sum(axis=2).max()))
     # Possible outcomes first: the others' probability is 0 and they are never drawn.
@@ -76,6 +76,10 @@ def outcomes_of_table(
         for k, row in enumerate(table[s][a]):
             place = s, a, k
             probability[place], next_state[place], reward[place], terminated[place] = row
+            if next_state[place] != row[1]:
+                raise RequestError(
+                    f"table[{s}][{a}]: next state = {row[1]!r}; a whole number is needed"
+                )
     if success is None and crash is None:
         events = _endings(terminated, reward, probability)
     else:

@@ -12,7 +12,7 @@ from gymnasium.wrappers import TimeLimit
 from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.checking import check_arrays, check_cells, check_common
+from qbumpers.tasks.checking import check_arrays, check_cells, check_common, normalised_rows
 from qbumpers.tasks.construction import (
     Judge,
     Table,
@@ -85,6 +85,9 @@ class TabularTask:
     def __post_init__(self) -> None:
         """Check every field."""
         check_arrays(self)
+        for field in ("probability", "start"):
+            rows = normalised_rows(f"task {self.name}: {field}", getattr(self, field))
+            object.__setattr__(self, field, rows)
         check_common(self, self.make_display)
         check_cells(self)
 
