@@ -65,7 +65,7 @@ def from_validation(
     Returns:
         The error, to be raised by the caller.
     """
-    problems = []
+    problems: list[str] = []
     for problem in error.errors(include_url=False):
         field = ".".join(str(part) for part in problem["loc"])
         given = "" if problem["type"] == "missing" else f" = {problem['input']!r}"

@@ -4,7 +4,7 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Annotated
 
 import typer
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable() -> Generator[None, None, None]:
     """End at once on Ctrl-C or SIGTERM, with a message; Typer would end without one."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -3,7 +3,7 @@
 import contextlib
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
 
 from rich.console import Console
 from rich.markup import escape
@@ -15,7 +15,7 @@ OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
 
 
 @contextlib.contextmanager
-def expert_warnings_printed() -> Iterator[None]:
+def expert_warnings_printed() -> Generator[None, None, None]:
     """Print warnings about action values that are no better than random play, a line each."""
     from qbumpers.experts import ExpertWarning
 

@@ -109,7 +109,7 @@ def train_several(
     Raises:
         RequestError: as `train_expert`, and if a kept file is damaged.
     """
-    experts = []
+    experts: list[NetworkValues] = []
     for seed in seeds:
         content = content_digest([task.digest(), recipe.words(seed)]).hex()
         path = folder / f"seed-{seed}-{content[:12]}.npz"

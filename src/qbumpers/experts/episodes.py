@@ -67,8 +67,10 @@ def play(task: Task, stepper: Stepper, policy: Policy, chance: float) -> Episode
     Raises:
         RequestError: if an observation or a reward is not finite.
     """
-    observation = stepper.reset(chance)
-    observations, actions, rewards, events = [observation], [], [], 0
+    actions: list[int] = []
+    rewards: list[float] = []
+    observation, events = stepper.reset(chance), 0
+    observations = [observation]
     while len(actions) < task.episode_limit:
         action = policy(observation, len(actions))
         observation, reward, event = stepper.step(action)
@@ -184,7 +186,7 @@ def play_several(
             f"{epsilon}; at least 1, 0, 0 and a number in [0, 1] are needed"
         )
     stepper = task.make_stepper()
-    played = []
+    played: list[Episode] = []
     for number in range(episodes):
         generator = np.random.default_rng([seed, number])
         chance = generator.random()

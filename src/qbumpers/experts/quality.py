@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 import polars as pl
-from scipy.spatial import KDTree
+from scipy.spatial import KDTree  # pyright: ignore[reportMissingTypeStubs]
 
 from qbumpers.errors import RequestError
 from qbumpers.experts.checking import MeanWithError, mean_with_error
@@ -125,7 +125,8 @@ def check_values(
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
     if policies is None:
         policies = default_policies(task, values, generator)
-    rows, path = [], []
+    rows: list[pl.DataFrame] = []
+    path: list[np.ndarray] = []
     for number in range(episodes):
         played = play(task, stepper, best, generator.random())
         every = dict.fromkeys(range(len(played.actions)), True)
@@ -189,7 +190,8 @@ def _distances(observations: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Distance of observations [N, D] to the nearest of a path [M, D], in standard deviations."""
     scale = observations.std(axis=0)
     scale[scale == 0] = 1
-    return KDTree(path / scale).query(observations / scale)[0]
+    tree: Any = KDTree(path / scale)
+    return tree.query(observations / scale)[0]
 
 
 def summarise(comparisons: pl.DataFrame) -> Quality:
@@ -239,7 +241,7 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
         (means over episodes, and the standard error of the bias), episodes.
     """
     known = comparisons.drop_nulls(["achieved", column])
-    rows = []
+    rows: list[dict[str, Any]] = []
     for low, high in itertools.pairwise(edges):
         inside = known.filter((pl.col(column) >= low) & (pl.col(column) < high))
         if inside.is_empty():

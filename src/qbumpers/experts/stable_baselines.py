@@ -1,5 +1,8 @@
 """Action values of a DQN that was trained by Stable-Baselines3."""
 
+# Stable-Baselines3 types some of what it has.
+# pyright: basic
+
 import zipfile
 from pathlib import Path
 from typing import Any

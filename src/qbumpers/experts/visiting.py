@@ -32,7 +32,7 @@ def visited_episodes(task: Task, values: NetworkValues, learners: int, seed: int
         The episodes.
     """
     generator = np.random.default_rng([seed, 0])
-    visited = []
+    visited: list[Episode] = []
     for number in range(learners):
         streams = trial_streams(seed, ["evaluated", task.digest()], range(number, number + 1))[0]
         visited += _learning_episodes(task, values.discount, streams)
@@ -86,7 +86,7 @@ def _learning_episodes(task: Task, discount: float, streams: np.ndarray) -> list
     stepper = _LearningStepper(task.make_stepper(), settings, memory, streams[EVALUATION])
     nothing = np.zeros(task.observation_size, np.float32)
     propose = entered(choose, settings, memory, nothing, rates, streams[LEARNER])
-    episodes = []
+    episodes: list[Episode] = []
     for number in range(_EPISODES):
         now = rates._replace(epsilon=scheduled(learner.epsilon, number, _EPISODES))
 

@@ -91,7 +91,8 @@ def named_parameters(layout: Layout, parameters: np.ndarray) -> dict[str, np.nda
     Returns:
         Views of `parameters`.
     """
-    named, offset = {}, 0
+    named: dict[str, np.ndarray] = {}
+    offset = 0
     for name, outputs, inputs in layout.layers():
         end = offset + outputs * inputs
         named[f"{name}.weight"] = parameters[offset:end].reshape(inputs, outputs)

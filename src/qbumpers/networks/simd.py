@@ -6,6 +6,9 @@ sum runs in one fixed order and every multiplication and addition is fused (roun
 wide the registers are. For matrices as small as a learner's that is also faster.
 """
 
+# llvmlite has no types, Numba few.
+# pyright: basic
+
 from collections.abc import Callable
 from typing import Any
 

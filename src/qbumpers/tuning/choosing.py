@@ -19,7 +19,7 @@ import io
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import polars as pl
 import tomli_w
@@ -218,7 +218,7 @@ def _table(tuning: Tuning) -> bytes:
 
 
 def _described(plan: Plan, tuning: Tuning) -> str:
-    facts = {
+    facts: dict[str, Any] = {
         "experiment": plan.experiment.name,
         "floor": tuning.floor,
         "confidence": tuning.confidence,

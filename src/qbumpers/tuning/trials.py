@@ -137,7 +137,8 @@ def gaps(span: Cell, finished: Iterable[Cell], size: int) -> list[Cell]:
     Returns:
         Cells in the order of their trials, which neither overlap each other nor finished ones.
     """
-    finished, missing, place = list(finished), [], span.first
+    missing: list[Cell] = []
+    finished, place = list(finished), span.first
     while place < span.end:
         here = [cell.end for cell in finished if cell.first <= place < cell.end]
         if here:

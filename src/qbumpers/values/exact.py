@@ -1,5 +1,8 @@
 """Exact Q* of a tabular task by dynamic programming."""
 
+# SciPy has no types.
+# pyright: basic
+
 from dataclasses import replace
 from typing import cast
 

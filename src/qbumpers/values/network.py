@@ -51,7 +51,7 @@ class NetworkValues:
     task: str
     method: str
     version: str = qbumpers.__version__
-    others: Mapping[str, "NetworkValues"] = field(default_factory=dict)
+    others: Mapping[str, "NetworkValues"] = field(default_factory=dict[str, "NetworkValues"])
 
     def __post_init__(self) -> None:
         """Check everything and freeze the parameters."""
@@ -157,7 +157,7 @@ def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) ->
     network = checked(Network, {**settings, "hidden": tuple(settings["hidden"])}, "network")
     inputs = shape.pop("inputs")
     actions = shape.pop("actions")
-    parts = []
+    parts: list[np.ndarray] = []
     for name, needed in named_shapes(network.layout(inputs, actions)).items():
         found = arrays.get(name)
         if found is None or (found.shape, found.dtype) != (needed, np.float32):

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 from zipfile import BadZipFile
 
 import numpy as np
@@ -66,7 +66,7 @@ class TabularValues:
     task: str
     method: str
     version: str = qbumpers.__version__
-    others: Mapping[str, "TabularValues"] = field(default_factory=dict)
+    others: Mapping[str, "TabularValues"] = field(default_factory=dict[str, "TabularValues"])
 
     def __post_init__(self) -> None:
         """Check the table and freeze it."""
@@ -92,7 +92,9 @@ class TabularValues:
         """Further values; an array is taken for a table of the same origin."""
         if not isinstance(given, np.ndarray):
             return given
-        return TabularValues(given, self.discount, self.task, self.method, self.version)
+        return TabularValues(
+            cast(np.ndarray, given), self.discount, self.task, self.method, self.version
+        )
 
     def __call__(self, observation: Any, /) -> np.ndarray:
         """Q*(s, .) as float64 [A]; the observation is the number of the state."""
