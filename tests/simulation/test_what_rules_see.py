@@ -20,6 +20,8 @@ from tests.simulation.corridors import in_the_corridor
 pytestmark = pytest.mark.usefixtures("own_registry")
 
 GOAL = 47
+SCALE = 2.0**-30
+"""Makes a probability of what is told, to the bit."""
 STEERED = np.random.default_rng(1).integers(0, 4, (48, 4)).astype(float)
 COMFORT = np.random.default_rng(2).integers(0, 8, (48, 4)) / 8
 
@@ -39,7 +41,7 @@ def tell(situation, noise, options):
     """Executes what the first further row says; its probability tells all the rest."""
     told = 1e6 * situation.state + 1e4 * situation.episode + 10 * situation.step
     told += situation.others[1, situation.proposed]
-    return Decision(int(situation.others[0, situation.proposed]), told)
+    return Decision(int(situation.others[0, situation.proposed]), told * SCALE)
 
 
 def simulated():
@@ -52,7 +54,7 @@ def assert_told(steps):
     number = np.arange(len(steps.episode)) - np.searchsorted(steps.episode, steps.episode)
     at = (steps.state, steps.proposed)
     told = 1e6 * steps.state + 1e4 * steps.episode + 10 * number + COMFORT[at]
-    assert np.array_equal(steps.probability, told)
+    assert np.array_equal(steps.probability, told * SCALE)
     assert np.array_equal(steps.executed, STEERED[at])
     assert number.max() > 20
 
@@ -101,7 +103,7 @@ def keep_note(memory, step, options):
 
 
 def read_note(situation, noise, options, memory):
-    return Decision(situation.proposed, memory.number)
+    return Decision(situation.proposed, memory.number * SCALE)
 
 
 def test_start_is_told_the_task():
@@ -112,10 +114,10 @@ def test_start_is_told_the_task():
         read_note
     )
     steps = record(on_the_cliff(("note", {}), episodes=1))
-    assert set(steps.probability) == {expected}
+    assert set(steps.probability) == {expected * SCALE}
     environment = walking("note")
     environment.reset()
-    assert environment.step(0)[-1]["assistance"]["probability"] == expected
+    assert environment.step(0)[-1]["assistance"]["probability"] == expected * SCALE
 
 
 NEEDS = {
