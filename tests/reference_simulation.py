@@ -169,6 +169,10 @@ class ReferenceTrial:
         next_state = int(task.next_state[place][index])
         return next_state, float(task.reward[place][index]), ends, events
 
+    def seen(self, state):
+        """What the assistant sees of a state."""
+        return state if self.task.seen is None else int(self.task.seen[state])
+
     def greedy_episode(self, counted):
         state, total, length, events, ended = self.first_state(self.greedy), 0.0, 0, 0, False
         action = None
@@ -223,9 +227,10 @@ class ReferenceTrial:
             proposed = self.hand(self.mean(state, epsilon), last, self.explore)
             noise = Noise(self.noise.random(), self.noise.random())
             situation = Situation(
-                state=state, values=np.array(values), others=self.condition.others[state],
-                proposed=proposed, earned=earned, discount=discount, start_value=start_value,
-                episode=episode, step=len(self.steps) - first_step,
+                state=self.seen(state), values=np.array(values),
+                others=self.condition.others[state], proposed=proposed, earned=earned,
+                discount=discount, start_value=start_value, episode=episode,
+                step=len(self.steps) - first_step,
             )  # fmt: skip
             executed, probability, undone = self.decided(situation, noise, helped)
             next_state, reward, would_end, happened = self.outcome(state, executed, self.nature)
@@ -245,7 +250,7 @@ class ReferenceTrial:
             )  # fmt: skip
             self.steps.append(step)
             if self.observe and helped:
-                self.observe(step)
+                self.observe(self.as_seen(step))
             self.counts["assisted"][state] += helped
             self.counts["overridden"][state] += step.overridden
             earned = earned + discount * reward
@@ -259,6 +264,11 @@ class ReferenceTrial:
             "events": events,
             "overrides": sum(step.overridden for step in steps),
         }
+
+    def as_seen(self, step):
+        """A step as the assistant's rule is shown it."""
+        seen = {name: self.seen(getattr(step, name)) for name in ("state", "next_state")}
+        return SimpleNamespace(**{**vars(step), **seen})
 
     def learn(
         self, state, proposed, executed, undone, reward, next_state, would_end, epsilon, rate

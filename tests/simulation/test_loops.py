@@ -21,6 +21,7 @@ from tests.reference_simulation import ReferenceTrial
 from tests.simulation.conditions import (
     BUMPERS,
     THRESHOLDS,
+    half_seen,
     in_a_random_world,
     on_slippery_ice,
     on_the_cliff,
@@ -75,6 +76,7 @@ CONDITIONS = {
         BUMPERS, learner=Sarsa(epsilon=WANDERING), motor=CLUMSY, forgetting=0.1
     ),
     "random world, forgetting": lambda: in_a_random_world(forgetting=0.3, retention=5),
+    "random world, half seen": half_seen,
     "cliff, budget": lambda: on_the_cliff(BUDGET),
     **{
         f"cliff, taken back, {name}": lambda name=name: taken_back(perception=name, penalty=2.5)

@@ -1,5 +1,6 @@
 """What rules are told, the same in every host, and what they ask of a task."""
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -84,6 +85,20 @@ def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
     model = simulated().model()
     with pytest.raises(RequestError, match=message):
         Session(assistant, CLIFF, model)
+
+
+def test_values_and_further_rows_are_those_of_what_is_seen():
+    register_assistant("tell", NoOptions, values=("safety", "comfort"))(tell)
+    seen = np.random.default_rng(4).integers(0, 48, 48)
+    task = dataclasses.replace(cliff_walking(), seen=seen)
+    condition = make_condition(task, make_assistant("tell"), values=Further())
+    assert np.array_equal(condition.values, CLIFF.table[seen])
+    assert np.array_equal(condition.others, np.stack([STEERED, COMFORT], axis=1)[seen])
+    steps = record(condition, seed=2)
+    states = task.next_state[steps.state, steps.executed, 0]
+    assert np.array_equal(steps.next_state, states)  # the record tells what the learner sees
+    told = (steps.probability // 1e6).astype(int)
+    assert np.array_equal(told, seen[steps.state])
 
 
 class Told(NamedTuple):
