@@ -25,9 +25,9 @@ def visited_episodes(
 
     Args:
         task: what is learned.
-        values: of the expert.
+        values: Q* of the expert, of which greedy actions are taken.
         learners: how many, each from its first episode on.
-        seed: of the random numbers, not negative.
+        seed: decides all that learners and policies draw; not negative.
 
     Returns:
         The episodes.
@@ -50,9 +50,9 @@ class _LearningStepper:
     """An environment whose every step a learner learns from.
 
     Args:
-        stepper: the environment.
-        settings: of the learner, as numbers.
-        memory: of the learner.
+        stepper: what is stepped.
+        settings: how the learner learns, as numbers.
+        memory: what the learner knows, changed in place after every step.
         stream: uint64 [4], random stream of its batches.
     """
 

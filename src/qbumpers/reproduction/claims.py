@@ -52,7 +52,7 @@ class Claim(NamedTuple):
     """A claim, and what the trials say about it.
 
     Attributes:
-        title: the claim in short.
+        title: the claim in a few words.
         rule: when it holds.
         every: whether it is about every setting (True) or about some setting (False).
         evidence: a row per setting and estimate.
