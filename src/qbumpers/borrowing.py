@@ -4,6 +4,8 @@ Numba counts references to arrays, atomically, even if a loop only reads an elem
 length of `table[state]` is known only at run time. Arrays borrowed here are not counted, and rows
 have a length known to the compiler, which then unrolls every loop over actions. Together they make
 the simulation several times as fast. Whoever borrows must hold the array until the loop is over.
+
+What rules and learners are given to read is read-only, which in compiled code is a matter of types.
 """
 
 import functools
@@ -78,6 +80,42 @@ def _used(typing_context: Any, arrays: Any) -> Any:
     return types.none(arrays), generate
 
 
+def read_only(arrays: Any) -> Any:
+    """The same arrays, which whoever gets them cannot change.
+
+    Args:
+        arrays: an array; in Python also a NamedTuple or tuple of arrays and numbers, or None.
+
+    Returns:
+        Views of the arrays.
+    """
+    if isinstance(arrays, np.ndarray):
+        view = arrays.view()
+        view.flags.writeable = False
+        return view
+    if isinstance(arrays, tuple):
+        parts: Any = map(read_only, arrays)
+        make = getattr(arrays, "_make", tuple)
+        return make(parts)
+    return arrays
+
+
+@overload(read_only, strict=False, jit_options=INLINE)
+def _compiled_read_only(arrays: Any) -> Any:
+    typed: Any = _typed_read_only
+    return lambda arrays: typed(arrays)
+
+
+@intrinsic
+def _typed_read_only(typing_context: Any, arrays: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if context.enable_nrt:
+            context.nrt.incref(builder, arrays, arguments[0])
+        return arguments[0]
+
+    return arrays.copy(readonly=True)(arrays), generate
+
+
 def row(table: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
     """What a table has at an index, borrowed; it must not outlive the table.
 
@@ -100,7 +138,7 @@ def _compiled_row(table: Any, index: Any, width: Any) -> Any:
 
 @intrinsic
 def _borrowed(typing_context: Any, table: Any, index: Any, width: Any) -> Any:
-    row_type = types.Array(table.dtype, table.ndim - 1, "C")
+    row_type = types.Array(table.dtype, table.ndim - 1, "C", readonly=not table.mutable)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source = arrayobj.make_array(table)(context, builder, arguments[0])

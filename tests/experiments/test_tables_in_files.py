@@ -1,6 +1,6 @@
 """In files: tables of perception and motor noise, several kinds of learners, rules over rules."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import polars as pl
 import pytest
@@ -81,7 +81,10 @@ def test_what_is_wrong_in_a_table_is_named(learner, message):
 
 
 def test_sarsa_runs_beside_q_learning_and_goes_on_where_it_was(tmp_path):
-    changes = {"learners": [{"name": "q-learning"}, {"name": "sarsa"}], "assistants": NONE}
+    changes: dict[str, Any] = {
+        "learners": [{"name": "q-learning"}, {"name": "sarsa"}],
+        "assistants": NONE,
+    }
     folder = run_into(tmp_path / "out", trials=2, **changes)
     results = load(folder)
     assert ids_of(**changes) == ["none@name=q-learning", "none@name=sarsa"]

@@ -111,12 +111,14 @@ def test_pictures_over_a_kept_backdrop_are_those_drawn_all_at_once(name, height)
 def test_an_environment_shows_where_it_is_now(name):
     environment = gymnasium.make(name, render_mode="rgb_array")
     state, _ = environment.reset(seed=0)
-    assert np.array_equal(environment.render(), picture(display_of(name), state))
+    assert np.array_equal(np.asarray(environment.render()), picture(display_of(name), state))
     for action in (0, 2, 1):
         before = state
         state, reward, *_ = environment.step(action)
         step = unassisted_step(before, action, float(reward), state)
-        assert np.array_equal(environment.render(), picture(display_of(name), state, step))
+        assert np.array_equal(
+            np.asarray(environment.render()), picture(display_of(name), state, step)
+        )
 
 
 @pytest.mark.parametrize("state", [0, 17, 26, 36, 47])

@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import CompilationError, result_type, type_of
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step
 from qbumpers.errors import RequestError
@@ -33,15 +34,15 @@ def compile_functions(kind: Kind, decide: Any, start: Any, observe: Any, options
         TypeError: if one of them returns something of another type than it should.
         RequestError: if the rule unpacks the situation by position.
     """
-    state = 0 if kind == "states" else np.zeros(1, np.float32)
-    values = np.zeros(2)
-    situation = type_of(Situation(state, values, np.zeros((0, 2)), 0, 0.0, 1.0, 0.0, 0, 0))
+    state = 0 if kind == "states" else read_only(np.zeros(1, np.float32))
+    values, others = read_only((np.zeros(2), np.zeros((0, 2))))
+    situation = type_of(Situation(state, values, others, 0, 0.0, 1.0, 0.0, 0, 0))
     noise = type_of(Noise(0.0, 0.0))
     options = type_of(options)
     arguments: tuple[Any, ...] = (situation, noise, options)
     if start is not None:
         dynamics = _example_dynamics() if kind == "states" else None
-        model = type_of(Model(1, 0, 2, -1, 1.0, dynamics, np.zeros((2, 2))))
+        model = type_of(read_only(Model(1, 0, 2, -1, 1.0, dynamics, np.zeros((2, 2)))))
         memory = result_type(start, options, model)
         step = type_of(
             Step(0, state, 0, 0, False, 0, False, 0.0, 0.0, 0.0, values, 0.0, 0.0, state, 0)

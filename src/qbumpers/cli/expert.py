@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from qbumpers.experts import Recipe
     from qbumpers.experts.checking import MeanWithError
     from qbumpers.experts.choosing import Judgement
-    from qbumpers.tasks import TabularTask
-    from qbumpers.tasks.vector import VectorTask
+    from qbumpers.tasks import Task
 
 
 Check = Annotated[
@@ -90,7 +89,7 @@ def expert(
     from qbumpers.experts.selecting import make_recipe
     from qbumpers.tasks import make_task
 
-    made: Any = make_task(task, discount=discount)
+    made = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     path = out or Path(f"{task.replace('/', '-')}.npz")
@@ -125,7 +124,7 @@ def _hidden(text: str) -> list[int]:
         ) from error
 
 
-def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
+def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.selecting import train_best
 
@@ -157,15 +156,13 @@ def _steps_bar() -> rich.progress.Progress:
     return rich.progress.Progress(*columns, console=OUTPUT)
 
 
-def _judgements(
-    task: "VectorTask", names: Sequence[Any], judgements: "Sequence[Judgement]"
-) -> Table:
-    kind = "success" if task.has_success else "return"
+def _judgements(task: "Task", names: Sequence[Any], judgements: "Sequence[Judgement]") -> Table:
+    kind = "success" if "success" in task.events else "return"
     listing = table(
         "seed", f"{kind}, 2% random", "10% random", "after 50 random", "greedy return",
         "V of start", "achieved", "Q at crashes",
     )  # fmt: skip
-    digits = 2 if task.has_success else 1
+    digits = 2 if "success" in task.events else 1
     for name, found in zip(names, judgements, strict=True):
         merits = (_number(merit, digits) for merit in found.merits)
         crash = "-" if found.crash_value is None else _number(found.crash_value, 1)
@@ -182,7 +179,7 @@ def _number(found: "MeanWithError", digits: int) -> str:
     return f"{found.mean:.{digits}f}"
 
 
-def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
+def _check(task: "Task", path: Path, figures: Path | None) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.choosing import judge
     from qbumpers.experts.loading import load_network
@@ -214,7 +211,7 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
         _draw(checks, path, figures)
 
 
-def _correct(task: "VectorTask", path: Path, out: Path) -> None:
+def _correct(task: "Task", path: Path, out: Path) -> None:
     from qbumpers.experts import correcting
     from qbumpers.experts.loading import load_network
 
@@ -252,9 +249,7 @@ def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
     OUTPUT.print(f"Figure: [bold]{escape(str(drawn))}[/bold]", soft_wrap=True)
 
 
-def _solve_or_check(
-    task: "TabularTask", check: Path | None, figures: Path | None, path: Path
-) -> None:
+def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path: Path) -> None:
     from qbumpers.experts.loading import load_table
     from qbumpers.experts.tables import check_exactness
     from qbumpers.values import solve

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
@@ -124,7 +125,7 @@ def _compile_once(
 ) -> None:  # fmt: skip
     """Compile a learner for the types that every host passes, without calling it."""
     states = observes == "states"
-    state = 0 if states else np.zeros(1, np.float32)
+    state = 0 if states else read_only(np.zeros(1, np.float32))
     settings = type_of(sample(settings_type))
     stream, real, whole = type_of(np.zeros(4, np.uint64)), type_of(0.0), type_of(0)
     shape = Shape(1, 0, (0, 0)) if states else Shape(0, 1, (0, 0))

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, TypedDict, Unpack
 import numpy as np
 
 from qbumpers.assistants import Assistant, assistant_of
+from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
@@ -107,14 +108,15 @@ class Condition(NamedTuple):
     def model(self) -> Model:
         """What a rule with memory may know of the task."""
         task = self.task
+        dynamics = task.dynamics() if task.states else None
         return Model(
             task.states,
             task.observation_size,
             task.actions,
             task.no_op,
             self.discount,
-            task.dynamics() if task.states else None,
-            task.distance,
+            read_only(dynamics),
+            read_only(task.distance),
         )
 
     def content(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from qbumpers.compilation import compiled_for_session, entered, hold, uncompiled
-from qbumpers.decisions import Step, checked_action
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
 from qbumpers.learners.dispatch import start as start_learner
@@ -23,7 +23,6 @@ from qbumpers.simulation.deep_steps import (
     take,
 )
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
-from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
 _ENDED = TERMINATED | TRUNCATED
@@ -103,7 +102,7 @@ class _Trial:
         script: Script | None,
         interpreted: bool,
     ) -> None:
-        task = cast(VectorTask, condition.task)
+        task = condition.task
         self._condition, self._task = condition, task
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
@@ -192,7 +191,6 @@ class _Trial:
             if length == 0:
                 condition.assistant.check_start(float(self._numbers[START_VALUE]))
             last, executed, undone = chosen[:3]
-            checked_action(executed, self._task.actions)
             next_observation, reward, event, after = self._environment_step(
                 observation, executed, undone
             )

@@ -9,17 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.assistants.dispatch import decide, observe, undoes
+from qbumpers.borrowing import read_only
 from qbumpers.choice import best_value
 from qbumpers.compilation import compiled_apart, inlined
 from qbumpers.decisions import (
     Account,
     Execution,
     Noise,
+    execution_of,
+    is_action,
     projected_return,
     settle,
     situate,
     step_of,
 )
+from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import choose, learn, prefer
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
@@ -158,6 +162,7 @@ def act(
     """
     settings, memory, rates, motor, _, assistance, numbers, streams = common.content
     row, other_rows = assistance.row, assistance.other_rows
+    observation = read_only(observation)
     actions, others = len(row), len(other_rows)
     for place in range(others + 1):  # in one loop, so that the network is compiled in once
         parameters = assistance.parameters[place]
@@ -172,17 +177,19 @@ def act(
     if script is None:
         meant = choose(settings, memory, observation, rates, streams[LEARNER])
         proposed = move(motor, meant, last, actions, streams[LEARNER])
+        if not is_action(proposed, actions):
+            raise RequestError("the learner's action is not a whole number in [0, actions)")
         noise = Noise(draw(streams[ASSISTANT]), draw(streams[ASSISTANT]))
     else:
         proposed, noise = script[0], Noise(script[1], script[2])
     if options is None:
         return proposed, proposed, False, 0.0, noise.coin, noise.tie
-    situation = situate(_account(numbers), observation, row, other_rows, proposed)
+    situation = situate(
+        _account(numbers), observation, read_only(row), read_only(other_rows), proposed
+    )
     decision = decide(situation, noise, options, rule_memory)
-    return (
-        proposed, int(decision.action), undoes(decision), float(decision.probability),
-        noise.coin, noise.tie,
-    )  # fmt: skip
+    executed, undone, probability = execution_of(decision, undoes(decision), actions)
+    return proposed, executed, undone, probability, noise.coin, noise.tie
 
 
 @compiled_apart
@@ -207,6 +214,7 @@ def take(
     settings, memory, rates, _, perception, assistance, numbers, streams = common.content
     proposed, executed, undone, probability, coin, tie = chosen
     next_observation, reward, events, happened = outcome
+    observation, next_observation = read_only(observation), read_only(next_observation)
     account = _account(numbers)
     overridden = executed != proposed or undone
     experience = perceive(
@@ -219,7 +227,10 @@ def take(
         return experience.action, projected, rule_memory, False
     if options is not None:
         step = step_of(
-            situate(account, observation, assistance.row, assistance.other_rows, proposed),
+            situate(
+                account, observation, read_only(assistance.row), read_only(assistance.other_rows),
+                proposed,
+            ),
             Noise(coin, tie), Execution(executed, undone, probability), experience.action, reward,
             next_observation, happened,
         )  # fmt: skip
@@ -254,5 +265,8 @@ def preferred(common: Any, observation: np.ndarray, reward: float, last: int, ov
     if over:
         return 0
     stream = streams[EVALUATION]
-    meant = prefer(settings, memory, observation, draw(stream))
-    return move(motor, meant, last, len(assistance.row), stream)
+    meant = prefer(settings, memory, read_only(observation), draw(stream))
+    done = move(motor, meant, last, len(assistance.row), stream)
+    if not is_action(done, len(assistance.row)):
+        raise RequestError("the learner's action is not a whole number in [0, actions)")
+    return done

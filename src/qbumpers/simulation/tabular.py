@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import uncompiled
 from qbumpers.decisions import Step
 from qbumpers.simulation.condition import Condition, compiled_learner, outcome_room, streams
@@ -52,8 +53,8 @@ def _call_loops(
     return loops(
         condition.model(),
         Assistance(
-            condition.values, condition.others, seen, condition.discount, assistant.numbers,
-            (0,) * task.actions,
+            read_only(condition.values), read_only(condition.others), seen, condition.discount,
+            assistant.numbers, (0,) * task.actions,
         ),
         LearnerStack(*compiled_learner(condition)),
         streams(condition, trials, seed),
