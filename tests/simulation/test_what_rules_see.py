@@ -1,4 +1,4 @@
-"""What rules are told, the same in every host, and what they ask of a task."""
+"""What rules see, the same in every host, and what they ask of a task."""
 
 import dataclasses
 from typing import NamedTuple
@@ -40,9 +40,9 @@ class Further:
 
 def tell(situation, noise, options):
     """Executes what the first further row says; its probability tells all the rest."""
-    told = 1e6 * situation.state + 1e4 * situation.episode + 10 * situation.step
-    told += situation.others[1, situation.proposed]
-    return Decision(int(situation.others[0, situation.proposed]), told * SCALE)
+    seen = 1e6 * situation.state + 1e4 * situation.episode + 10 * situation.step
+    seen += situation.others[1, situation.proposed]
+    return Decision(int(situation.others[0, situation.proposed]), seen * SCALE)
 
 
 def simulated():
@@ -50,12 +50,12 @@ def simulated():
     return on_the_cliff(("tell", {}), values=Further(), episodes=5)
 
 
-def assert_told(steps):
+def assert_all_seen(steps):
     """Recounted from the table of steps alone."""
     number = np.arange(len(steps.episode)) - np.searchsorted(steps.episode, steps.episode)
     at = (steps.state, steps.proposed)
-    told = 1e6 * steps.state + 1e4 * steps.episode + 10 * number + COMFORT[at]
-    assert np.array_equal(steps.probability, told * SCALE)
+    expected = 1e6 * steps.state + 1e4 * steps.episode + 10 * number + COMFORT[at]
+    assert np.array_equal(steps.probability, expected * SCALE)
     assert np.array_equal(steps.executed, STEERED[at])
     assert number.max() > 20
 
@@ -63,7 +63,7 @@ def assert_told(steps):
 def test_a_simulated_rule_knows_where_it_is_and_reads_its_rows_in_its_order():
     condition = simulated()
     assert condition.assistant.compiled
-    assert_told(record(condition, seed=2))
+    assert_all_seen(record(condition, seed=2))
 
 
 def test_the_wrapper_tells_the_same():
@@ -72,7 +72,7 @@ def test_the_wrapper_tells_the_same():
     actions = np.random.default_rng(3).integers(4, size=120)
     for _ in range(3):
         rows += [Step(**step[-1]["assistance"]) for step in play(environment, actions)[1:]]
-    assert_told(Step(*(np.array(column) for column in zip(*rows, strict=True))))
+    assert_all_seen(Step(*(np.array(column) for column in zip(*rows, strict=True))))
 
 
 def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
@@ -121,7 +121,7 @@ def read_note(situation, noise, options, memory):
     return Decision(situation.proposed, memory.number * SCALE)
 
 
-def test_start_is_told_the_task():
+def test_start_gets_the_task():
     # 48 states, 4 actions, no action that does nothing, discount 1; down from above the cliff leads
     # to the start, 36, for -100; every two actions are equally far apart.
     expected = 48e6 + 4e3 - 1 + 36 / 64 - 1000 + 1 / 1024 + 1.0
