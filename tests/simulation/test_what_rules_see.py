@@ -97,7 +97,7 @@ def test_values_and_further_rows_are_those_of_what_is_seen():
     steps = record(condition, seed=2)
     states = task.next_state[steps.state, steps.executed, 0]
     assert np.array_equal(steps.next_state, states)  # the record tells what the learner sees
-    told = (steps.probability // 1e6).astype(int)
+    told = (steps.probability / SCALE // 1e6).astype(int)
     assert np.array_equal(told, seen[steps.state])
 
 
