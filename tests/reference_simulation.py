@@ -93,7 +93,7 @@ def learned_from(perception, proposed, executed, undone, reward, coin):
 
 
 def draw_index(probabilities, generator):
-    """Index of the outcome that happens; nothing is drawn where there is but one."""
+    """Index of the outcome that happens; nothing is drawn if there is but one."""
     if len(probabilities) == 1:
         return 0
     chance, sum_so_far = generator.random(), 0.0
@@ -139,9 +139,9 @@ class ReferenceTrial:
                 self.draw_from(bit_generators_of_episode(self.seed, common, self.trial, episode))
             if episode > 0:
                 self.forget(self.condition.forgetting)
-            helped = episode < self.condition.episodes
-            assisted = self.training_episode(episode, helped)
-            unassisted = self.greedy_episode(helped)
+            is_assisted = episode < self.condition.episodes
+            assisted = self.training_episode(episode, is_assisted)
+            unassisted = self.greedy_episode(is_assisted)
             self.episodes.append(
                 {f"assisted_{name}": value for name, value in assisted.items()}
                 | {f"unassisted_{name}": value for name, value in unassisted.items()}
@@ -209,13 +209,13 @@ class ReferenceTrial:
             return self.ahead[1]
         return self.explored(state, epsilon)
 
-    def decided(self, situation, noise, helped):
+    def decided(self, situation, noise, is_assisted):
         """(executed, probability, undone)."""
-        if not helped:
+        if not is_assisted:
             return situation.proposed, 0.0, False
         return (*self.rule(situation, noise), False)[:3]
 
-    def training_episode(self, episode, helped):
+    def training_episode(self, episode, is_assisted):
         epsilon = scheduled(self.learner.epsilon, episode, self.condition.episodes)
         rate = scheduled(self.learner.learning_rate, episode, self.condition.episodes)
         state, self.ahead = self.first_state(self.nature), None
@@ -232,7 +232,7 @@ class ReferenceTrial:
                 discount=discount, start_value=start_value, episode=episode,
                 step=len(self.steps) - first_step,
             )  # fmt: skip
-            executed, probability, undone = self.decided(situation, noise, helped)
+            executed, probability, undone = self.decided(situation, noise, is_assisted)
             next_state, reward, would_end, happened = self.outcome(state, executed, self.nature)
             ended = would_end and not undone
             happened -= would_end - ended
@@ -249,9 +249,9 @@ class ReferenceTrial:
                 projected_return=earned + discount * values[proposed], reward=reward,
             )  # fmt: skip
             self.steps.append(step)
-            if self.observe and helped:
+            if self.observe and is_assisted:
                 self.observe(self.as_seen(step))
-            self.counts["assisted"][state] += helped
+            self.counts["assisted"][state] += is_assisted
             self.counts["overridden"][state] += step.overridden
             earned = earned + discount * reward
             discount = discount * self.condition.discount

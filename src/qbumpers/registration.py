@@ -51,6 +51,7 @@ def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], 
     """
 
     def reduce(instance: tuple[Any, ...]) -> Any:
+        """How pickle makes an instance again: by name, as the class there is another."""
         return remade, (name, tuple(instance))
 
     members = {"__slots__": (), "__reduce__": reduce}

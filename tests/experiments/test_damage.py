@@ -1,4 +1,4 @@
-"""What was finished and then spoiled: damage anywhere is noticed, told and mended."""
+"""What was finished and then spoiled: damage anywhere is noticed, named and mended."""
 
 import shutil
 

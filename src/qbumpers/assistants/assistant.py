@@ -27,7 +27,7 @@ class Assistant:
     """A rule with its options; stateless, so one serves any number of hosts.
 
     Attributes:
-        rule: the registered rule.
+        rule: what decides, as registered.
         options: checked options, an instance of `rule.options_type`. In the options of a rule over
             a rule, `of` is the other Assistant.
     """

@@ -105,6 +105,7 @@ def register_assistant(
     _check(name, options_type, start, observe, needs, values)
 
     def decorate(function: Callable[..., Decision]) -> Callable[..., Decision]:
+        """Register the rule, compiled if possible; the function itself stays what it was."""
         built_in = is_of_package(function)
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),

@@ -132,8 +132,8 @@ def apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> 
 
     Args:
         learner: one of them.
-        among: the learners of an experiment.
-        mark: put before what is told.
+        among: all learners of the experiment, itself included.
+        mark: what is put before it.
 
     Returns:
         For instance "@perception=observant".

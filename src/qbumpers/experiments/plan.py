@@ -39,8 +39,8 @@ class Plan(NamedTuple):
     """An experiment made ready.
 
     Attributes:
-        experiment: the design.
-        task: its task.
+        experiment: what it was made from.
+        task: what its learners learn.
         values: Q* of its assistants.
         named: the conditions as the experiment names them, each with the digest of its content.
         conditions: what the trials of each content need.
@@ -57,13 +57,13 @@ def make_plan(experiment: Experiment) -> Plan:
     """Check a whole experiment.
 
     Args:
-        experiment: the design.
+        experiment: what it was made from.
 
     Returns:
         The plan.
 
     Raises:
-        RequestError: where the task, values, a learner or an assistant is wrong.
+        RequestError: if the task, values, a learner or an assistant is wrong.
 
     Warns:
         ExpertWarning: if the values of a network are no better than random play.
@@ -113,10 +113,10 @@ def _values(source: str, task: Task) -> TabularValues | NetworkValues:
 def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     """How long cells will take on one core, from a short calibration.
 
-    Compiles loops where they are not compiled yet.
+    Compiles loops if they are not compiled yet.
 
     Args:
-        plan: the experiment.
+        plan: the experiment that the cells belong to.
         cells: what is to be done.
 
     Returns:

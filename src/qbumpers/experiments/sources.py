@@ -55,7 +55,7 @@ def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
     """An experiment from a TOML file.
 
     Args:
-        path: of the file.
+        path: where the file is.
         large: whether more than `MANY_CELLS` cells of work are meant.
 
     Returns:
@@ -77,7 +77,7 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
     """What a TOML file says.
 
     Args:
-        content: of the file.
+        content: the bytes of the file.
         where: for the message, for example the path of the file.
 
     Returns:

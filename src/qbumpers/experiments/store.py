@@ -29,7 +29,7 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
     "states.parquet",
     "values.npz",
 )
-"""Files of an output folder; design and platform, a row an episode, a row a state, Q*."""
+"""Files of an output folder; design and platform, a row per episode, a row per state, Q*."""
 
 NEEDED = (EXPERIMENT, EPISODES, STATES, VALUES)
 """What the analysis reads."""
@@ -54,8 +54,8 @@ class Results(NamedTuple):
 
     Attributes:
         experiment: as run.
-        episodes: a row an episode.
-        states: a row a condition and state; None where observations are vectors.
+        episodes: a row per episode.
+        states: a row per condition and state; None if observations are vectors.
         values: Q* of the assistants.
     """
 
@@ -84,7 +84,7 @@ class Store:
     shows wherever it is.
 
     Args:
-        folder: of the results, locked.
+        folder: where the results are, locked against other writers.
         tables: what a finished cell holds, see `tables_of`.
     """
 
@@ -96,7 +96,7 @@ class Store:
         """Look for finished cells, check them, and clear damaged files away.
 
         Args:
-            contents: of the conditions that are wanted.
+            contents: digests of the conditions that are wanted.
 
         Returns:
             What there is.
@@ -138,7 +138,7 @@ class Store:
             parts: the cells of each condition, in the order of their trials.
 
         Raises:
-            StoreError: where a cell cannot be read, or a table cannot be written.
+            StoreError: if a cell cannot be read, or a table cannot be written.
         """
         cells = [(named, cell) for named, chosen in parts for cell in chosen]
         for kind in self._tables:
@@ -155,7 +155,7 @@ class Store:
         return self.read(cell, kind).select(*_labels(named, kind), pl.all())
 
     def read(self, cell: Cell, kind: str) -> pl.DataFrame:
-        """A table of a cell that was written or surveyed; StoreError where it is damaged."""
+        """A table of a cell that was written or surveyed; StoreError if it is damaged."""
         name = self._files[cell, kind]
         content = self._folder.read(name) or b""
         if f"-{_digest(content)}." not in name:
@@ -211,16 +211,16 @@ def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
     """Open an output folder for one run, which alone writes to it.
 
     Args:
-        folder: of the results, a path or a URL; made where it is missing.
+        folder: where the results go, a path or a URL; made if it is missing.
         experiment: to be run, or continued.
 
     Yields:
         The store, with what a killed run left half-written cleared away.
 
     Raises:
-        RequestError: where the folder is a file, holds another experiment, or another run is
+        RequestError: if the folder is a file, holds another experiment, or another run is
             writing to it.
-        StoreError: where it cannot be written.
+        StoreError: if it cannot be written.
     """
     place = open_folder(folder)
     with place.locked():
@@ -238,13 +238,13 @@ def load(folder: str | Path) -> Results:
     """What an output folder holds, as Polars frames.
 
     Args:
-        folder: of a finished run, a path or a URL.
+        folder: output folder of a finished run, a path or a URL.
 
     Returns:
         The experiment and its tables.
 
     Raises:
-        RequestError: where the folder is not one of a finished run, or damaged.
+        RequestError: if the folder is not one of a finished run, or damaged.
     """
     place = open_folder(folder)
     experiment = _read_design(place)
@@ -287,7 +287,7 @@ def _described(experiment: Experiment) -> str:
 
 
 def _read_design(folder: Folder) -> Experiment | None:
-    """The experiment of an output folder; None where there is none."""
+    """The experiment of an output folder; None if there is none."""
     content = folder.read(EXPERIMENT)
     if content is None:
         return None

@@ -57,7 +57,7 @@ def play(task: Task, stepper: Stepper, policy: Policy, chance: float) -> Episode
 
     Args:
         task: what is played.
-        stepper: its environment.
+        stepper: the environment of the task, reset by this call.
         policy: chooses the actions.
         chance: in [0, 1), for the environment; equal chance and actions give equal episodes.
 
@@ -111,6 +111,7 @@ def greedy(values: QValues, actions: int, generator: np.random.Generator) -> Pol
     """
 
     def policy(observation: np.ndarray, step: int) -> int:
+        """The best action, whatever the step."""
         row = check_width(values(observation), actions, f"at step {step}")
         return _pick(row, _best_value(row), generator.random())
 
@@ -130,7 +131,7 @@ def epsilon_greedy(
         greedy: decides otherwise.
         epsilon: probability of a random action.
         actions: A.
-        generator: of the random actions.
+        generator: draws the coins and the random actions.
         random_start: steps at the beginning of an episode that are all random.
 
     Returns:
@@ -138,6 +139,7 @@ def epsilon_greedy(
     """
 
     def policy(observation: np.ndarray, step: int) -> int:
+        """A random action, surely at first and later by chance; else the greedy one."""
         if step < random_start or generator.random() < epsilon:
             return int(generator.integers(actions))
         return greedy(observation, step)
@@ -150,6 +152,7 @@ def replay_then(recorded: Sequence[int] | np.ndarray, policy: Policy) -> Policy:
     actions = np.asarray(recorded).tolist()
 
     def replaying(observation: np.ndarray, step: int) -> int:
+        """The recorded action of the step while there is one, then the policy's."""
         return actions[step] if step < len(actions) else policy(observation, step)
 
     return replaying
@@ -172,7 +175,7 @@ def play_several(
         episodes: how many, at least 1.
         epsilon: probability of a random action instead.
         random_start: random actions at the beginning of each episode.
-        seed: of the random numbers, not negative.
+        seed: decides chance of the environment and random actions; not negative.
 
     Returns:
         The episodes; the first ones do not depend on how many follow.

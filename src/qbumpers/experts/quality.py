@@ -39,7 +39,7 @@ class Quality(NamedTuple):
         bias: mean of Q(s, a) minus the return achieved, over states that the policies visited.
         absolute: mean size of that difference.
         crash_value: mean Q of the very action that crashed; None if nothing did.
-        crash_return: the reward it brought.
+        crash_return: mean reward that this action brought; None if nothing crashed.
         overestimated: share of values above what was achieved.
     """
 
@@ -62,7 +62,7 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
             more than 1% hangs on what would have followed are unknown; nothing is bootstrapped.
 
     Returns:
-        float64 [T], NaN where unknown.
+        float64 [T], NaN if unknown.
     """
     returns, total = np.empty(len(rewards)), 0.0
     for step in range(len(rewards) - 1, -1, -1):
@@ -97,13 +97,13 @@ def check_values(
     """Compare action values with what is achieved, in states that policies visit.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: any callable from an observation to a value per action.
-        discount: of the values.
+        discount: that the values state, in (0, 1].
         policies: that visit states, by name, for instance a learner's; if None, greedy ones with
             10%, 30% and all actions random. "greedy" is always among them.
-        episodes: of each policy, at least 2.
-        seed: of the random numbers, not negative.
+        episodes: how many each policy plays, at least 2.
+        seed: decides chance of the environment and random actions; not negative.
 
     Returns:
         A row per state and action compared: policy, episode, time (of the step, from 0),
@@ -266,9 +266,9 @@ def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame
     """Action values of a tabular task against the exact solution.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: any callable from the number of a state to a value per action.
-        discount: of the values.
+        discount: that the values state, in (0, 1].
 
     Returns:
         A row per state that an episode can act in and action: state, action, value, exact.

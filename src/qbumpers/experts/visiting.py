@@ -24,9 +24,9 @@ def visited_episodes(task: Task, values: NetworkValues, learners: int, seed: int
 
     Args:
         task: what is learned.
-        values: of the expert.
+        values: Q* of the expert, of which greedy actions are taken.
         learners: how many, each from its first episode on.
-        seed: of the random numbers, not negative.
+        seed: decides all that learners and policies draw; not negative.
 
     Returns:
         The episodes.
@@ -49,9 +49,9 @@ class _LearningStepper:
     """An environment whose every step a learner learns from.
 
     Args:
-        stepper: the environment.
-        settings: of the learner, as numbers.
-        memory: of the learner.
+        stepper: what is stepped.
+        settings: how the learner learns, as numbers.
+        memory: what the learner knows, changed in place after every step.
         stream: uint64 [4], random stream of its batches.
     """
 

@@ -59,11 +59,11 @@ class Condition(NamedTuple):
 
     Attributes:
         task: what is to be learned.
-        values: Q* of the assistant; float64 [S, A] of a task with a table, else a network.
+        values: Q* of the assistant; float64 [S, A] if the task has a table, else a network.
         others: the further rows of values that the assistant's rule named, float64 [S, K, A], or
             networks.
-        discount: of those values.
-        assistant: that helps.
+        discount: gamma of those values, in (0, 1].
+        assistant: what helps in the first `episodes`.
         learner: settings of the simulated learner.
         perception: what it believes happened, or the name of that.
         penalty: of a named perception that includes disruption, in reward units.
@@ -106,7 +106,7 @@ class Condition(NamedTuple):
         return found._replace(penalty=self.penalty) if found.penalty else found
 
     def model(self) -> Model:
-        """What a rule with memory is told of the task."""
+        """What a rule with memory may know of the task."""
         task = self.task
         dynamics = task.dynamics() if task.states else None
         return Model(
@@ -323,7 +323,7 @@ def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | Non
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:
-    """Room for the outcomes of so many trials."""
+    """Arrays [T, E] for the outcomes of so many trials, to be filled."""
     kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
     shape = (trials, condition.episodes + condition.retention)
     return Outcomes(*(np.zeros(shape, kind) for kind in kinds))

@@ -34,7 +34,7 @@ def simulate(
         task: what is to be learned.
         assistant: an assistant, or the name of one that needs no options.
         trials: how many, at least 1; or which.
-        seed: of the experiment, not negative.
+        seed: decides, with the condition and the number of a trial, all chance; not negative.
         workers: threads, or processes if a task steps in Python; a script that asks for several of
             those must guard its start with `if __name__ == "__main__"`.
         **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
@@ -130,7 +130,7 @@ def record(
     Args:
         condition: what to simulate.
         trial: which trial.
-        seed: of the experiment.
+        seed: as for `simulate`.
         script: proposals and noise to be played again, in place of a learner's and fresh noise;
             the trial ends with the script.
 

@@ -51,7 +51,7 @@ class UndoableStepper(Stepper, Protocol):
         """Put the state of a snapshot back.
 
         Args:
-            snapshot: of this episode.
+            snapshot: from `snapshot`, in this episode.
         """
         ...
 
@@ -63,7 +63,7 @@ class GymnasiumStepper:
 
     Args:
         name: id of the environment.
-        arguments: of the environment.
+        arguments: what the environment takes besides, by name.
     """
 
     def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
@@ -97,8 +97,8 @@ def make_environment(name: str, **arguments: Any) -> Any:
     """A Gymnasium environment.
 
     Args:
-        name: its id.
-        **arguments: of `gymnasium.make`.
+        name: id of the environment, for example "CartPole-v1".
+        **arguments: what `gymnasium.make` takes besides.
 
     Returns:
         The environment.

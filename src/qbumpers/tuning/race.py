@@ -105,7 +105,7 @@ def looks(trials: int) -> list[int]:
     """After how many trials the conditions of a race are compared.
 
     Args:
-        trials: of the experiment.
+        trials: how many trials per condition the experiment has.
 
     Returns:
         A twentieth of the trials (at least `FIRST_LOOK`), then twice as many each time, to all.

@@ -19,7 +19,7 @@ class TuningProgress(NamedTuple):
     Attributes:
         trials: looked at, those of an earlier run included.
         of: trials of the whole experiment, of which most will not be needed.
-        steps: that learners took in this run.
+        steps: how many steps learners took in this run.
         damaged: files of an earlier run that were damaged; their trials are run again.
     """
 
@@ -37,12 +37,12 @@ class Trials:
 
     Args:
         plan: the experiment, made ready.
-        store: of the results.
+        store: where trials are kept, and found if they were run before.
         backend: where to run.
         report: called with the progress at first and after each cell.
 
     Attributes:
-        contents: of the conditions, in the order of the experiment.
+        contents: digests of the conditions, in the order of the experiment.
         length: N.
         raced: how many trials of a content were looked at in races.
         fresh: how many were looked at for measuring it anew.

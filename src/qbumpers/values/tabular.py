@@ -49,10 +49,10 @@ class TabularValues:
 
     Attributes:
         table: float64 [S, A], in reward units, read-only.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
         task: name of the task.
         method: how they were made, in words.
-        version: of the package that made them.
+        version: which version of the package made them.
         others: further values by name, of the same shape, for rules that ask for them; an array
             [S, A] will do.
 
@@ -110,7 +110,7 @@ class TabularValues:
         """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
 
         Args:
-            path: of the file.
+            path: where the file goes.
 
         Raises:
             StoreError: if it cannot be written.
@@ -145,7 +145,7 @@ def load_values(path: str | Path) -> TabularValues | NetworkValues:
     """Read values that `TabularValues.save` or `NetworkValues.save` wrote.
 
     Args:
-        path: of the file.
+        path: where the file is.
 
     Returns:
         The values.
@@ -167,7 +167,7 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
     """Values from the bytes of a file that `save` wrote.
 
     Args:
-        content: of the file.
+        content: the bytes of the file.
         path: for messages.
 
     Returns:
