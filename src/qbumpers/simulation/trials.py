@@ -83,7 +83,7 @@ class Engine(Protocol):
         Args:
             condition: what to simulate.
             trials: which trials.
-            seed: of the experiment's random streams.
+            seed: the experiment's, for the random streams.
         """
         ...
 
@@ -99,8 +99,8 @@ class Engine(Protocol):
 
         Args:
             condition: what to simulate.
-            trials: the one trial.
-            seed: of the experiment's random streams.
+            trials: a range of one trial.
+            seed: the experiment's, for the random streams.
             script: proposals and noise to be played again; None to draw them.
             interpreted: whether to run compiled code as plain Python, to be compared with.
         """
