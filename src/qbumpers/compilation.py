@@ -28,7 +28,7 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 
 _NEVER_COMPILED = {
     "analysis", "cli", "conformance.py", "experiments", "files.py", "reproduction", "session.py",
-    "shared_control.py", "tuning",
+    "shared_control.py", "source", "tuning",
 }  # fmt: skip
 
 

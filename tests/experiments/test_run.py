@@ -53,6 +53,7 @@ def test_a_run_writes_its_design_cells_tables_and_values(folder):
     names = {path.name for path in folder.iterdir()}
     assert names - {".lock"} == {
         "experiment.toml",
+        "conditions.json",
         "cells",
         "episodes.parquet",
         "states.parquet",
@@ -68,7 +69,7 @@ def test_the_design_as_run_can_be_run_again_and_says_where_it_ran(folder):
     assert written["learners"][0]["epsilon"] == {"start": 1.0, "end": 0.02, "fraction": 0.9}
     libraries = ("numpy", "numba", "scipy", "polars")
     assert written["run"] == {
-        "format": 2,
+        "format": 3,
         **{name: version(name) for name in libraries},
         "version": qbumpers.__version__,
         "python": platform.python_version(),

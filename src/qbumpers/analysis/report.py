@@ -93,7 +93,7 @@ def find(results: Results, add: Add = nothing) -> Findings:
         add: finds what is to be added.
     """
     trials = trial_measures(results.episodes, results.experiment.criterion)
-    found = find_tables(trials, results.experiment)
+    found = find_tables(trials, results.experiment, results.conditions)
     found = found._replace(additions=add(results, found))
     return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
 

@@ -5,6 +5,7 @@ import hashlib
 import importlib.metadata
 import os
 import pickle
+import platform
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
@@ -156,12 +157,13 @@ def batches(seconds: dict[Cell, float], cores: int) -> Iterator[list[Cell]]:
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What decides the bytes of a cell, but for the experiment: code, by its name."""
+    """What decides the bytes of a cell, but for the experiment: code and processor, by name."""
     sources = source_stamp().encode() + Path(work.__file__).read_bytes()
     return {
         "qbumpers": qbumpers.__version__,
         "sources of qbumpers": hashlib.sha256(sources).hexdigest()[:12],
         **{name: importlib.metadata.version(name) for name in ("numba", "numpy", "polars")},
+        "processor": platform.machine(),
     }
 
 

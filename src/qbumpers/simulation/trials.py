@@ -75,7 +75,15 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
 
 
 class Engine(Protocol):
-    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`."""
+    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`.
+
+    Attributes:
+        REVISION: raised when the numbers that it gives change.
+        PRECISION: of those numbers.
+    """
+
+    REVISION: int
+    PRECISION: str
 
     def run_block(self, condition: Condition, trials: range, seed: int) -> Simulation:
         """Simulate trials of a condition, one after another on one core.
