@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from qbumpers.compilation import CompilationError, compiled_for_session, is_compiled
+from qbumpers.compilation import CompilationError, compiled_for_session, compiles, is_compiled
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
@@ -68,6 +68,8 @@ def compiled_or_plain(
     Returns:
         The functions, and what they compile for: nothing if they are plain Python.
     """
+    if not compiles():
+        return functions, frozenset()
     session = tuple(
         f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
     )

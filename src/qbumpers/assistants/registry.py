@@ -10,6 +10,7 @@ import numpy as np
 
 from qbumpers.compilation import (
     CompilationError,
+    is_compiled,
     is_of_package,
     result_type,
     type_of,
@@ -279,7 +280,7 @@ def register_assistant(
         built_in = is_of_package(function)
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),
-            frozenset({"states", "vectors"}), built_in,
+            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in,
         )  # fmt: skip
         if rule.over_a_rule and values:
             raise RequestError(f"rule {name!r}: a rule over a rule reads the rows of that rule")

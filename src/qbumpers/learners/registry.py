@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from qbumpers.compilation import is_of_package, result_type, type_of
+from qbumpers.compilation import is_compiled, is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.registration import checked_class, compiled_or_plain, fresh_class, sample
@@ -91,7 +91,7 @@ def register_learner(
         raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
     functions = (start, choose, prefer, policy, learn, begin)
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
-    compiled = True
+    compiled = is_compiled(choose)
     if not built_in:
         settings_type = fresh_class(settings_type, name, _remade)
         attempt = partial(_compile_once, settings_type, observes)
