@@ -157,9 +157,12 @@ def _is_file(hint: Any) -> bool:
 def _numbers_in(name: str, field: str) -> np.ndarray:
     """Float64 [N, K], the numbers in a file."""
     try:
-        found = np.load(name) if Path(name).suffix == ".npy" else np.loadtxt(name, delimiter=",")
+        if Path(name).suffix == ".npy":
+            found = np.load(name)
+        else:
+            found = np.loadtxt(name, delimiter=",", encoding="utf-8-sig", ndmin=2)
         numbers = np.ascontiguousarray(np.atleast_2d(found), np.float64)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise RequestError(
             f"{field} = {name!r}: not a .npy or .csv file of numbers ({reason})"
