@@ -1,6 +1,7 @@
 """Rules a second time: plain Python, written from Algorithm 1 and Section 4 of the paper."""
 
 import collections
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ class PlainRule:
 class PlainBudget:
     """Another rule, until it has overridden so often in one episode."""
 
-    def __init__(self, of, per_episode):
+    def __init__(self, of: dict[str, Any], per_episode: int):
         self.of, self.per_episode = plain_rule(**of), per_episode
         self.spent = collections.Counter()
 

@@ -8,6 +8,7 @@ and the names of conditions.
 import hashlib
 import json
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class _Words(np.random.bit_generator.ISeedSequence):
     def __init__(self, words):
         self.words = words
 
-    def generate_state(self, n_words, dtype=np.uint32):
+    def generate_state(self, n_words: int, dtype: Any = np.uint32) -> np.ndarray:
         assert (n_words, dtype) == (len(self.words), np.uint64)
         return self.words
 
@@ -48,7 +49,8 @@ def _seed_sequence(seed, content):
 
 def _four(drawn):
     state = drawn[-12:]
-    return [np.random.SFC64(_Words(state[first : first + 3])) for first in (0, 3, 6, 9)]
+    seeds: list[Any] = [_Words(state[first : first + 3]) for first in (0, 3, 6, 9)]
+    return [np.random.SFC64(words) for words in seeds]
 
 
 def scheduled(schedule, episode, episodes):

@@ -48,7 +48,7 @@ def plain(returned: Any) -> Any:
     return returned.tolist() if isinstance(returned, np.ndarray | np.generic) else returned
 
 
-class Dial(gymnasium.Env[np.ndarray, int]):
+class Dial(gymnasium.Env[np.ndarray, np.int64]):
     """Actions 5, 6 and 7, an array as observation; remembers what it was told to do."""
 
     observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
@@ -61,7 +61,7 @@ class Dial(gymnasium.Env[np.ndarray, int]):
         return np.zeros(2, np.float32), {"temperature": 20}
 
     def step(self, action):
-        self.told.append(action)
+        self.told.append(int(action))
         return np.full(2, 0.5, np.float32), 1.0, len(self.told) == 4, False, {"temperature": 21}
 
 

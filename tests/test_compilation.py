@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 from qbumpers import compilation
 from qbumpers.kept_code import CodeFiles, DamagedCodeError
+from tests.narrowing import of_kind, present
 
 RULE = """
 from pocket.compilation import compiled
@@ -77,9 +79,9 @@ def shown(package, **environment):
 def stamp(package):
     """`source_stamp` of the package, as a fresh process would compute it."""
     path = package / "compilation.py"
-    spec = importlib.util.spec_from_file_location("pocket_compilation", path)
+    spec = present(importlib.util.spec_from_file_location("pocket_compilation", path))
     module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    present(spec.loader).exec_module(module)
     return module.source_stamp()
 
 
@@ -272,16 +274,19 @@ def _weigh(numbers, pair, nested):
 def test_entered_code_gives_what_the_function_gives_and_compiles_once():
     examples = (np.zeros(2), Pair(0, 0.0), ((0, 0.0), 1))
     entry = compilation.entered(_weigh, *examples)
-    assert len(_weigh.signatures) == 1
+    assert len(of_kind(Dispatcher, _weigh).signatures) == 1
     arguments = (np.array([1.5, 2.0, 4.0]), Pair(3, 0.25), ((7, 0.125), 9))
     assert entry(*arguments) == _weigh(*arguments) == 7.5 * 0.25 + 3 + 0.125
     compilation.entered(_weigh, *examples)
-    assert len(_weigh.signatures) == 1
+    assert len(of_kind(Dispatcher, _weigh).signatures) == 1
 
 
 def test_a_function_that_is_not_compiled_is_entered_as_it_is():
     plain = compilation.uncompiled(_weigh)
     assert compilation.entered(plain, np.zeros(2)) is plain
+
+
+hold = compilation.compiled_for_session(compilation.uncompiled(compilation.hold))
 
 
 @compilation.compiled_for_session
@@ -293,7 +298,7 @@ def _grow(common, amount):
 
 def test_held_values_are_entered_with_and_stay_the_same_arrays():
     numbers = np.array([1.0, 2.0])
-    common = compilation.hold((Pair(3, 0.5), numbers))
+    common = hold((Pair(3, 0.5), numbers))
     entry = compilation.entered(_grow, common, 0.0)
     assert entry(common, 4.0) == 3 + 7
     numbers[1] = 10.0
@@ -302,7 +307,7 @@ def test_held_values_are_entered_with_and_stay_the_same_arrays():
 
 
 def test_held_values_outlive_the_names_of_their_arrays():
-    common = compilation.hold((Pair(1, 0.5), np.full(1000, 2.0)))
+    common = hold((Pair(1, 0.5), np.full(1000, 2.0)))
     others = [np.full(1000, 9.0) for _ in range(50)]  # would reuse memory that was given back
     assert len(others) == 50
     assert _grow(common, 0.0) == 1 + 2000

@@ -4,6 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+from tests.narrowing import of_kind
 from tests.shared_control_examples import RIGHT, UP, bumpers, walking
 
 START = 36
@@ -12,7 +13,8 @@ START = 36
 def train(environment: gymnasium.Env, episodes: int, seed: int) -> np.ndarray:
     """Undiscounted tabular Q-learning, epsilon and learning rate falling together; Q [S, A]."""
     generator = np.random.default_rng(seed)
-    table = np.zeros((environment.observation_space.n, environment.action_space.n))
+    sizes = (environment.observation_space, environment.action_space)
+    table = np.zeros([of_kind(gymnasium.spaces.Discrete, space).n for space in sizes])
     environment.reset(seed=seed)
     for episode in range(episodes):
         rate = max(0.02, 1 - episode / (0.9 * episodes))
@@ -22,7 +24,7 @@ def train(environment: gymnasium.Env, episodes: int, seed: int) -> np.ndarray:
             explores = generator.random() < rate
             action = int(generator.choice(len(table[state]) if explores else best))
             following, reward, terminated, truncated, _ = environment.step(action)
-            target = reward + (0 if terminated else table[following].max())
+            target = float(reward) + (0 if terminated else table[following].max())
             table[state, action] += rate * (target - table[state, action])
             state, ended = following, terminated or truncated
     return table

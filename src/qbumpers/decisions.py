@@ -2,7 +2,7 @@
 
 Every host (the Gymnasium wrapper, the simulators, a session with a person) builds the same
 `Situation`, draws the same `Noise`, calls the same rule, keeps the same `Step` and counts returns
-by the same functions: `begin`, `situate`, `checked_action`, `step_of`, `settle`.
+by the same functions: `begin`, `situate`, `execution_of`, `step_of`, `settle`.
 """
 
 from typing import Any, NamedTuple
@@ -208,18 +208,6 @@ def settle(account: Account, reward: float, discount: float) -> Account:
     )
 
 
-@inlined
-def checked_action(action: int, actions: int) -> int:
-    """The action that a rule chose, if there is such an action.
-
-    Raises:
-        RequestError: if it does not lie in [0, `actions`).
-    """
-    if not 0 <= action < actions:
-        raise RequestError("the assistant's rule chose an action outside the action space")
-    return action
-
-
 class Execution(NamedTuple):
     """What was decided and done on one step; the part of a `Step` that no environment tells.
 
@@ -232,6 +220,32 @@ class Execution(NamedTuple):
     executed: int
     undone: bool
     probability: float
+
+
+@inlined
+def is_action(action: float, actions: int) -> bool:
+    """Whether a number is an action: whole, and in [0, `actions`)."""
+    return 0 <= action < actions and int(action) == action
+
+
+@inlined
+def execution_of(decision: Decision, undone: bool, actions: int) -> Execution:
+    """What a decision asks for, if it can be done.
+
+    Args:
+        decision: of a rule; its `undo` is not looked at, since compiled code may lack it.
+        undone: whether the state is to be taken back.
+        actions: A.
+
+    Raises:
+        RequestError: if its action is not a whole number in [0, A), or its probability not a number
+            in [0, 1].
+    """
+    if not is_action(decision.action, actions):
+        raise RequestError("the rule's action is not a whole number in [0, number of actions)")
+    if not 0 <= decision.probability <= 1:
+        raise RequestError("the rule's probability of an override does not lie in [0, 1]")
+    return Execution(int(decision.action), undone, float(decision.probability))
 
 
 @inlined

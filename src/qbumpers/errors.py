@@ -1,6 +1,7 @@
 """Errors that a user can mend: each names the field, the value and what is allowed."""
 
 import difflib
+import operator
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,24 @@ if TYPE_CHECKING:
 
 class RequestError(ValueError):
     """The request was wrong: a name, an option, a file or an environment that cannot serve."""
+
+
+def whole_number(value: Any, where: str, allowed: str) -> int:
+    """A number of an action or the like.
+
+    Args:
+        value: an int or one of NumPy's integers; a fraction or a text is no such number, and is not
+            rounded.
+        where: for the message, for instance "action".
+        allowed: for the message, for instance "in [0, 4)".
+
+    Raises:
+        RequestError: if it is not whole.
+    """
+    try:
+        return operator.index(value)
+    except TypeError as error:
+        raise RequestError(f"{where} = {value!r}; a whole number {allowed} is needed") from error
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:

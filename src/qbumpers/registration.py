@@ -6,6 +6,7 @@ among the settings reach it as such.
 """
 
 import itertools
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,6 +18,8 @@ from qbumpers.compilation import CompilationError, compiled_for_session, compile
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
+
+_COLOUR_CODE = re.compile(r"\x1b\[[\d;]*m")
 
 _FILE = "a file of numbers"
 
@@ -87,8 +90,9 @@ def compiled_or_plain(
 
 
 def shortened(error: BaseException) -> str:
-    """Numba's message in one line."""
-    return "; ".join(line.strip() for line in str(error).splitlines()[:4] if line.strip())
+    """The beginning of Numba's message in one line, without its colours."""
+    lines = _COLOUR_CODE.sub("", str(error)).splitlines()[:4]
+    return "; ".join(line.strip() for line in lines if line.strip())
 
 
 def sample(kind: Any, nested: Any = None) -> Any:

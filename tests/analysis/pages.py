@@ -18,8 +18,8 @@ class Page(HTMLParser):
         self.close()
         assert self.open == []
 
-    def handle_starttag(self, tag, attributes):
-        values = dict(attributes)
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
         self.references += [
             values[key] for key in ("src", "href", "action", "data") if key in values
         ]

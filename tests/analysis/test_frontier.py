@@ -104,7 +104,8 @@ def reached_by_hand(points, level, axis):
     frontier = sorted(points[index].tolist()[:: 1 - 2 * axis] for index in pareto(points))
     if level > frontier[-1][0]:
         return math.nan
-    return float(np.interp(level, *zip(*frontier, strict=True)))
+    levels, reached = zip(*frontier, strict=True)
+    return float(np.interp(level, levels, reached))
 
 
 @given(st.lists(POINTS, min_size=1, max_size=3), st.sampled_from([0, 1]), st.floats(-5, 5))

@@ -3,10 +3,10 @@
 import pytest
 
 from qbumpers import load_values, solve
-from qbumpers.cli import expert as command
 from qbumpers.experts import correcting, visiting
 from qbumpers.tasks import make_task
-from qbumpers.values import TabularValues
+from qbumpers.values import NetworkValues, TabularValues
+from tests.narrowing import of_kind
 from tests.values.networks import constant, network_of
 
 POLE = ("CartPole-v1", "--discount", "0.9")
@@ -48,7 +48,7 @@ def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
     assert status == 0
     assert "return, 10% after 50" in output
     assert "Kept seed" in output
-    values = load_values("expert.npz")
+    values = of_kind(NetworkValues, load_values("expert.npz"))
     assert "the best of seeds 0, 1; return" in values.method
     assert values.network.hidden == (8,)
     kept = sorted((tmp_path / "expert.npz.work").iterdir())
@@ -121,7 +121,6 @@ def test_the_help_states_the_rule_of_choice(call):
     said = " ".join(output.split())
     for part in ("2% random actions", "10% random actions", "after 50 random actions"):
         assert part in said
-    assert command.expert.__doc__
 
 
 def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_path):
@@ -141,4 +140,4 @@ def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_
     monkeypatch.setattr(choosing, "train_expert", original)
     assert call("expert", *QUICK)[0] == 0
     assert kept.stat().st_mtime_ns == before
-    assert load_values("CartPole-v1.npz").inputs == 4
+    assert of_kind(NetworkValues, load_values("CartPole-v1.npz")).inputs == 4

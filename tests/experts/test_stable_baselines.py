@@ -1,6 +1,7 @@
 """Models of Stable-Baselines3 as action values: those of the model itself."""
 
 import sys
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -28,7 +29,9 @@ def single_thread():
     torch.set_num_threads(before)
 
 
-def trained(steps=0, environment="CartPole-v1", algorithm=DQN, policy="MlpPolicy", **fields):
+def trained(
+    steps=0, environment: Any = "CartPole-v1", algorithm: Any = DQN, policy="MlpPolicy", **fields
+):
     shape = fields.pop("policy_kwargs", {"net_arch": [16, 8]})
     model = algorithm(policy, environment, device="cpu", seed=0, policy_kwargs=shape, **fields)
     return model.learn(steps) if steps else model

@@ -39,7 +39,7 @@ def stream(name="test"):
     return trial_streams(0, name, range(1))[0, LEARNER]
 
 
-def made(network, precision=np.float64, **changes):
+def made(network, precision: type[np.floating] = np.float64, **changes):
     """A learner, its layout, and a memory whose target network differs from its network."""
     learner = DoubleDQN(network=network, **changes)
     layout = network.layout(INPUTS, ACTIONS)

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners import PERCEPTIONS, Perception, perceive, perception
 from qbumpers.learners.perception import believed
@@ -96,7 +97,7 @@ def test_compiled_and_interpreted_agree_with_the_plain_table(
     step = SimpleNamespace(proposed=proposed, executed=executed, undone=undone, reward=reward)
     expected = learned_from((notices, credit, penalty), **vars(step), coin=coin)
     numbers = as_numbers(Perception(notices, credit, penalty))
-    for function in (perceive, perceive.py_func):
+    for function in (perceive, uncompiled(perceive)):
         found = function(numbers, **vars(step), coin=coin)
         if expected is None:
             assert found.action == -1

@@ -21,7 +21,7 @@ def on_the_cliff(assistant, *, episodes=12, **settings):
 
 
 def taken_back(*, tolerance=1.5, **settings):
-    """On the cliff with a rule that undoes; it stays registered."""
+    """On the cliff with a rule that undoes, registered for this test."""
     register_assistant("take-back", TakeBackOptions, needs=("undo",))(take_back)
     return on_the_cliff(("take-back", {"tolerance": tolerance}), **settings)
 

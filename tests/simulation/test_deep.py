@@ -212,7 +212,7 @@ def test_records_tell_the_decisions_by_the_assistants_rule():
     condition = in_the_corridor(*BUMPERS, episodes=20)
     steps = record(condition)
     assert steps.state.shape == steps.next_state.shape == (len(steps.episode), 3)
-    earned, discount = 0.0, 1.0
+    earned, discount, start_value = 0.0, 1.0, 0.0
     for i in range(len(steps.episode)):
         if i == 0 or steps.episode[i] != steps.episode[i - 1]:
             earned, discount, start_value = 0.0, 1.0, condition.values(steps.state[i]).max()

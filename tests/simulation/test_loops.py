@@ -15,6 +15,7 @@ from qbumpers.learners import (
 )
 from qbumpers.simulation import Script, record, run
 from qbumpers.tasks import cliff_walking
+from tests.narrowing import present
 from tests.reference_rules import plain_rule
 from tests.reference_simulation import ReferenceTrial
 from tests.simulation.conditions import (
@@ -131,9 +132,9 @@ def test_every_outcome_is_the_plain_simulations(condition, plain_trials):
 
 
 def test_every_count_is_the_plain_simulations(condition, plain_trials):
-    counts = run(condition, trials=TRIALS, seed=SEED).counts
+    counts = present(run(condition, trials=TRIALS, seed=SEED).counts)
     for field, found in counts._asdict().items():
-        expected = sum(plain.counts[field] for plain in plain_trials)
+        expected = np.sum([plain.counts[field] for plain in plain_trials], axis=0)
         assert found.tolist() == expected.tolist(), field
 
 

@@ -19,8 +19,44 @@ if TYPE_CHECKING:
     from qbumpers.experts import Recipe
     from qbumpers.experts.checking import MeanWithError
     from qbumpers.experts.choosing import Judgement
-    from qbumpers.tasks import TabularTask
-    from qbumpers.tasks.vector import VectorTask
+    from qbumpers.tasks import Task
+
+
+Check = Annotated[
+    Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
+]
+Figures = Annotated[
+    Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
+]
+Out = Annotated[
+    Path | None, typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE")
+]
+Corrected = Annotated[
+    Path | None,
+    typer.Option(
+        help="Also correct the values by what they achieve where learners go, into this file.",
+        metavar="FILE",
+    ),
+]
+Discount = Annotated[
+    float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
+]
+Seeds = Annotated[
+    int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
+]
+Steps = Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)]
+Activation = Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")]
+Hidden = Annotated[str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")]
+LearningRate = Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")]
+RandomStart = Annotated[
+    int,
+    typer.Option(
+        "--random-start",
+        "--opening",
+        help="Random actions before each episode of training.",
+        metavar="N",
+    ),
+]
 
 
 @application.command()
@@ -28,45 +64,17 @@ def expert(
     task: Annotated[
         str, typer.Argument(help="Name of a task, or of a Gymnasium environment.", metavar="TASK")
     ],
-    check: Annotated[
-        Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE"),
-    ] = None,
-    corrected: Annotated[
-        Path | None,
-        typer.Option(
-            help="Also correct the values by what they achieve where learners go, into this file.",
-            metavar="FILE",
-        ),
-    ] = None,
-    discount: Annotated[
-        float | None,
-        typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER"),
-    ] = None,
-    seeds: Annotated[
-        int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
-    ] = 10,
-    steps: Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)] = 400_000,
-    activation: Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")] = "tanh",
-    hidden: Annotated[
-        str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")
-    ] = "64,64",
-    learning_rate: Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")] = 5e-4,
-    random_start: Annotated[
-        int,
-        typer.Option(
-            "--random-start",
-            "--opening",
-            help="Random actions before each episode of training.",
-            metavar="N",
-        ),
-    ] = 50,
+    check: Check = None,
+    figures: Figures = None,
+    out: Out = None,
+    corrected: Corrected = None,
+    discount: Discount = None,
+    seeds: Seeds = 10,
+    steps: Steps = 400_000,
+    activation: Activation = "tanh",
+    hidden: Hidden = "64,64",
+    learning_rate: LearningRate = 5e-4,
+    random_start: RandomStart = 50,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 
@@ -81,7 +89,7 @@ def expert(
     from qbumpers.experts.selecting import make_recipe
     from qbumpers.tasks import make_task
 
-    made: Any = make_task(task, discount=discount)
+    made = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     path = out or Path(f"{task.replace('/', '-')}.npz")
@@ -116,7 +124,7 @@ def _hidden(text: str) -> list[int]:
         ) from error
 
 
-def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
+def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.selecting import train_best
 
@@ -148,15 +156,13 @@ def _steps_bar() -> rich.progress.Progress:
     return rich.progress.Progress(*columns, console=OUTPUT)
 
 
-def _judgements(
-    task: "VectorTask", names: Sequence[Any], judgements: "Sequence[Judgement]"
-) -> Table:
-    kind = "success" if task.has_success else "return"
+def _judgements(task: "Task", names: Sequence[Any], judgements: "Sequence[Judgement]") -> Table:
+    kind = "success" if "success" in task.events else "return"
     listing = table(
         "seed", f"{kind}, 2% random", "10% random", "after 50 random", "greedy return",
         "V of start", "achieved", "Q at crashes",
     )  # fmt: skip
-    digits = 2 if task.has_success else 1
+    digits = 2 if "success" in task.events else 1
     for name, found in zip(names, judgements, strict=True):
         merits = (_number(merit, digits) for merit in found.merits)
         crash = "-" if found.crash_value is None else _number(found.crash_value, 1)
@@ -173,7 +179,7 @@ def _number(found: "MeanWithError", digits: int) -> str:
     return f"{found.mean:.{digits}f}"
 
 
-def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
+def _check(task: "Task", path: Path, figures: Path | None) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.choosing import judge
     from qbumpers.experts.loading import load_network
@@ -205,7 +211,7 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
         _draw(checks, path, figures)
 
 
-def _correct(task: "VectorTask", path: Path, out: Path) -> None:
+def _correct(task: "Task", path: Path, out: Path) -> None:
     from qbumpers.experts import correcting
     from qbumpers.experts.loading import load_network
 
@@ -243,9 +249,7 @@ def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
     OUTPUT.print(f"Figure: [bold]{escape(str(drawn))}[/bold]", soft_wrap=True)
 
 
-def _solve_or_check(
-    task: "TabularTask", check: Path | None, figures: Path | None, path: Path
-) -> None:
+def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path: Path) -> None:
     from qbumpers.experts.loading import load_table
     from qbumpers.experts.tables import check_exactness
     from qbumpers.values import solve

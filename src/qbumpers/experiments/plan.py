@@ -3,7 +3,7 @@
 import dataclasses
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
@@ -12,7 +12,7 @@ from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import Task, VectorTask
+from qbumpers.tasks import Task
 from qbumpers.values import (
     NetworkValues,
     TabularValues,
@@ -26,7 +26,7 @@ _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
-_SOURCES: dict[str, Callable[[Any], TabularValues | NetworkValues]] = {
+_SOURCES: dict[str, Callable[[Task], TabularValues | NetworkValues]] = {
     "exact": solve,
     "q-learning": learn_values,
     "expert": lambda task: shipped_expert(task.name),
@@ -91,7 +91,7 @@ def make_plan(experiment: Experiment) -> Plan:
         named.append((each, content))
         conditions[content] = condition
     if not task.states:
-        check_expert(cast(VectorTask, task), values)
+        check_expert(task, values)
     return Plan(experiment, task, values, named, conditions)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.experts.episodes import play_several
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import QValues
 
 
@@ -47,7 +47,7 @@ def mean_with_error(numbers: np.ndarray) -> MeanWithError:
 
 
 def check_expert(
-    task: VectorTask, values: QValues, *, episodes: int = 20, epsilon: float = 0.02, seed: int = 0
+    task: Task, values: QValues, *, episodes: int = 20, epsilon: float = 0.02, seed: int = 0
 ) -> ExpertCheck:
     """Compare greedy play by action values with random play; warn if it is no better.
 

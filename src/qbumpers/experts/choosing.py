@@ -12,7 +12,7 @@ from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, discounted_return, play_several
 from qbumpers.experts.training import Recipe, train_expert
 from qbumpers.random_streams import content_digest
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import load_values
 
@@ -43,7 +43,7 @@ class Judgement(NamedTuple):
     crash_value: MeanWithError | None
 
 
-def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
+def judge(task: Task, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
     """Judge an expert.
 
     Args:
@@ -70,8 +70,8 @@ def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) 
     )
 
 
-def _merit(task: VectorTask, episodes: Iterable[Episode]) -> MeanWithError:
-    if task.has_success:
+def _merit(task: Task, episodes: Iterable[Episode]) -> MeanWithError:
+    if "success" in task.events:
         return mean_with_error(np.array([float(episode.success) for episode in episodes]))
     return mean_with_error(np.array([episode.rewards.sum() for episode in episodes]))
 
@@ -88,7 +88,7 @@ def best(judgements: Sequence[Judgement]) -> int:
 
 
 def train_several(
-    task: VectorTask,
+    task: Task,
     recipe: Recipe,
     seeds: Iterable[int],
     folder: Path,
@@ -128,10 +128,10 @@ def train_several(
 
 
 def with_provenance(
-    task: VectorTask, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
+    task: Task, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
 ) -> NetworkValues:
     """The same values, with how they were chosen and what they reach in their provenance."""
-    kind = "success" if task.has_success else "return"
+    kind = "success" if "success" in task.events else "return"
     reached = ", ".join(
         f"{merit.mean:.2f} at epsilon {epsilon:g}"
         + (f" after {start} random actions" if start else "")

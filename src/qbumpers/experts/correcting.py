@@ -24,7 +24,7 @@ from qbumpers.learners.interface import Transition
 from qbumpers.networks.network import Layout, named_parameters
 from qbumpers.random_streams import LEARNER, trial_streams
 from qbumpers.registration import as_numbers
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 BRANCHES = 6_000
@@ -82,7 +82,7 @@ class Correction(NamedTuple):
 
 
 def correct_values(
-    task: VectorTask,
+    task: Task,
     values: NetworkValues,
     *,
     branches: int = BRANCHES,
@@ -128,7 +128,7 @@ def _chosen(samples: Samples, which: np.ndarray) -> Samples:
 
 
 def sample_returns(
-    task: VectorTask,
+    task: Task,
     values: NetworkValues,
     visited: list[Episode],
     branches: int,

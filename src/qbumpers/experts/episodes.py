@@ -9,7 +9,8 @@ from qbumpers.choice import best_value, pick
 from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import QValues, check_width
 
 Policy = Callable[[np.ndarray, int], int]
@@ -51,7 +52,7 @@ class Episode(NamedTuple):
         return bool(self.events & CRASH)
 
 
-def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> Episode:
+def play(task: Task, stepper: Stepper, policy: Policy, chance: float) -> Episode:
     """Play an episode.
 
     Args:
@@ -84,7 +85,7 @@ def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> E
     return episode
 
 
-def _check_finite(task: VectorTask, episode: Episode) -> None:
+def _check_finite(task: Task, episode: Episode) -> None:
     rewards = np.concatenate([[0.0], episode.rewards])
     broken = np.flatnonzero(~np.isfinite(episode.observations.sum(axis=1) + rewards))
     if len(broken):
@@ -153,7 +154,7 @@ def replay_then(recorded: Sequence[int] | np.ndarray, policy: Policy) -> Policy:
 
 
 def play_several(
-    task: VectorTask,
+    task: Task,
     values: QValues,
     episodes: int,
     *,

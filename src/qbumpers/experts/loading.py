@@ -3,13 +3,12 @@
 from pathlib import Path
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import TabularValues, load_values
 
 
-def load_network(task: VectorTask, path: str | Path) -> NetworkValues:
+def load_network(task: Task, path: str | Path) -> NetworkValues:
     """The network of a values file.
 
     Args:
@@ -31,7 +30,7 @@ def load_network(task: VectorTask, path: str | Path) -> NetworkValues:
     return values
 
 
-def load_table(task: TabularTask, path: str | Path) -> TabularValues:
+def load_table(task: Task, path: str | Path) -> TabularValues:
     """The table of a values file.
 
     Args:

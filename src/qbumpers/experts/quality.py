@@ -9,7 +9,7 @@ actions again.
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import polars as pl
@@ -18,8 +18,9 @@ from scipy.spatial import KDTree
 from qbumpers.errors import RequestError
 from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, Policy, epsilon_greedy, greedy, play, replay_then
+from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.exact import reachable_states, solve
 from qbumpers.values.tabular import QValues, check_width
 
@@ -74,7 +75,7 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
 
 
 def default_policies(
-    task: VectorTask, values: QValues, generator: np.random.Generator
+    task: Task, values: QValues, generator: np.random.Generator
 ) -> dict[str, Policy]:
     """Policies that leave the expert's path: greedy with several shares of random actions."""
     best = greedy(values, task.actions, generator)
@@ -85,7 +86,7 @@ def default_policies(
 
 
 def check_values(
-    task: VectorTask,
+    task: Task,
     values: QValues,
     *,
     discount: float,
@@ -143,9 +144,7 @@ def check_values(
     return found.drop("observation").with_columns(distance=pl.Series(distance))
 
 
-def branch(
-    task: VectorTask, stepper: Stepper, visited: Episode, place: int, policy: Policy
-) -> Episode:
+def branch(task: Task, stepper: Stepper, visited: Episode, place: int, policy: Policy) -> Episode:
     """Play an episode again up to and with step `place`, and go on by another policy."""
     return play(task, stepper, replay_then(visited.actions[: place + 1], policy), visited.chance)
 
@@ -261,7 +260,7 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
     return pl.DataFrame(rows)
 
 
-def check_table(task: TabularTask, values: QValues, *, discount: float) -> pl.DataFrame:
+def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame:
     """Action values of a tabular task against the exact solution.
 
     Args:
@@ -273,10 +272,11 @@ def check_table(task: TabularTask, values: QValues, *, discount: float) -> pl.Da
         A row per state that an episode can act in and action: state, action, value, exact.
 
     Raises:
-        RequestError: if values are wrong or the exact ones do not exist.
+        RequestError: if the task has no table of transitions, values are wrong or the exact ones do
+            not exist.
     """
     exact = solve(task, discount).table
-    states = np.flatnonzero(reachable_states(task))
+    states = np.flatnonzero(reachable_states(cast(TabularTask, task)))
     claimed = np.stack([check_width(values(int(s)), task.actions, f"in state {s}") for s in states])
     return pl.DataFrame(
         {

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from qbumpers.errors import checked
 from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
 from qbumpers.experts.training import Recipe
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 
@@ -30,7 +30,7 @@ class Selection(NamedTuple):
 
 
 def make_recipe(
-    task: VectorTask,
+    task: Task,
     *,
     steps: int,
     hidden: Sequence[int],
@@ -62,7 +62,7 @@ def make_recipe(
 
 
 def train_best(
-    task: VectorTask,
+    task: Task,
     recipe: Recipe,
     seeds: Sequence[int],
     path: Path,

@@ -9,13 +9,13 @@ from gymnasium import spaces
 
 from qbumpers.errors import RequestError, checked
 from qbumpers.networks.network import Network
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 _ACTIVATIONS = {"Tanh": "tanh", "ReLU": "relu"}
 
 
-def from_stable_baselines(model: Any, task: VectorTask) -> NetworkValues:
+def from_stable_baselines(model: Any, task: Task) -> NetworkValues:
     """Convert a DQN of Stable-Baselines3; its weights are copied.
 
     Args:
@@ -74,7 +74,7 @@ def _loaded(kind: Any, path: Path) -> Any:
         raise RequestError(f"model {path}: not a DQN of Stable-Baselines3 ({reason})") from error
 
 
-def _check_spaces(where: str, model: Any, task: VectorTask) -> None:
+def _check_spaces(where: str, model: Any, task: Task) -> None:
     seen, done = model.observation_space, model.action_space
     suits = (
         isinstance(seen, spaces.Box)

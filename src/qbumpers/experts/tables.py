@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.experts.quality import check_table
-from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import TabularValues
 
 
@@ -25,7 +25,7 @@ class TableCheck(NamedTuple):
     mean_error: float
 
 
-def check_exactness(task: TabularTask, values: TabularValues) -> TableCheck:
+def check_exactness(task: Task, values: TabularValues) -> TableCheck:
     """Compare a table with the exact solution at its own discount.
 
     Args:
@@ -33,7 +33,7 @@ def check_exactness(task: TabularTask, values: TabularValues) -> TableCheck:
         values: of the expert.
 
     Raises:
-        RequestError: if the exact values do not exist.
+        RequestError: if the task has no table of transitions or the exact values do not exist.
     """
     found = check_table(task, values, discount=values.discount)
     errors = (found["value"] - found["exact"]).to_numpy()

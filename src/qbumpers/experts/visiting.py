@@ -10,7 +10,8 @@ from qbumpers.learners.schedules import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import TERMINATED
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 _EPISODES = 100  # of each learner
@@ -18,9 +19,7 @@ _EPSILONS = (0.1, 0.3, 0.6)  # of the expert's episodes, in turn
 _LONGEST_START = 100  # random actions that every other one of them may begin with
 
 
-def visited_episodes(
-    task: VectorTask, values: NetworkValues, learners: int, seed: int
-) -> list[Episode]:
+def visited_episodes(task: Task, values: NetworkValues, learners: int, seed: int) -> list[Episode]:
     """Episodes of unassisted learners, and as many epsilon-greedy ones of the expert, shuffled.
 
     Args:
@@ -78,7 +77,7 @@ class _LearningStepper:
         return observation, reward, event
 
 
-def _learning_episodes(task: VectorTask, discount: float, streams: np.ndarray) -> list[Episode]:
+def _learning_episodes(task: Task, discount: float, streams: np.ndarray) -> list[Episode]:
     """Episodes of a learner from its first on."""
     learner = DoubleDQN(discount=discount)
     layout = learner.network.layout(task.observation_size, task.actions)

@@ -1,12 +1,13 @@
 """Learners by name: registering one, and checking the settings of one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import is_compiled, is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
@@ -39,6 +40,8 @@ class LearnerType:
     compiled: bool
     built_in: bool
 
+
+_FUNCTIONS = ("start", "choose", "prefer", "policy", "learn", "begin")
 
 _learners: dict[str, LearnerType] = {}
 _learners_by_settings: dict[type, LearnerType] = {}
@@ -89,24 +92,32 @@ def register_learner(
     missing = set(settings_type._fields) - set(settings_type._field_defaults)  # type: ignore[attr-defined]
     if missing:
         raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
-    functions = (start, choose, prefer, policy, learn, begin)
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
-    compiled = is_compiled(choose)
-    if not built_in:
-        settings_type = fresh_class(settings_type, name, _remade)
-        attempt = partial(_compile_once, settings_type, observes)
-        functions, compiles_for = compiled_or_plain(
-            f"learner {name!r}", functions, {observes: attempt}
-        )
-        compiled = bool(compiles_for)
-    start, choose, prefer, policy, learn, begin = functions  # type: ignore[assignment]
     learner = LearnerType(
-        name, settings_type, start, choose, prefer, policy, learn, begin, observes, compiled,
-        built_in,
+        name, settings_type, start, choose, prefer, policy, learn, begin, observes,
+        is_compiled(choose), built_in,
     )  # fmt: skip
+    if not built_in:
+        learner = _of_user(learner)
     _learners[name] = learner
-    _learners_by_settings[settings_type] = learner
-    return settings_type
+    _learners_by_settings[learner.settings_type] = learner
+    return learner.settings_type
+
+
+def _of_user(learner: LearnerType) -> LearnerType:
+    """A learner from outside the package: with settings of its own class, compiled if possible."""
+    settings_type = fresh_class(learner.settings_type, learner.name, _remade)
+    functions, compiles_for = compiled_or_plain(
+        f"learner {learner.name!r}",
+        tuple(getattr(learner, name) for name in _FUNCTIONS),
+        {learner.observes: partial(_compile_once, settings_type, learner.observes)},
+    )
+    return replace(
+        learner,
+        settings_type=settings_type,
+        compiled=bool(compiles_for),
+        **dict(zip(_FUNCTIONS, functions, strict=True)),
+    )
 
 
 def _compile_once(
@@ -115,7 +126,7 @@ def _compile_once(
 ) -> None:  # fmt: skip
     """Compile a learner for the types that every host passes, without calling it."""
     states = observes == "states"
-    state = 0 if states else np.zeros(1, np.float32)
+    state = 0 if states else read_only(np.zeros(1, np.float32))
     settings = type_of(sample(settings_type))
     stream, real, whole = type_of(np.zeros(4, np.uint64)), type_of(0.0), type_of(0)
     shape = Shape(1, 0, (0, 0)) if states else Shape(0, 1, (0, 0))

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, TypedDict, Unpack
 import numpy as np
 
 from qbumpers.assistants import Assistant, assistant_of
+from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
@@ -107,14 +108,15 @@ class Condition(NamedTuple):
     def model(self) -> Model:
         """What a rule with memory is told of the task."""
         task = self.task
+        dynamics = task.dynamics() if task.states else None
         return Model(
             task.states,
             task.observation_size,
             task.actions,
             task.no_op,
             self.discount,
-            task.dynamics() if task.states else None,
-            task.distance,
+            read_only(dynamics),
+            read_only(task.distance),
         )
 
     def content(self) -> dict[str, Any]:
@@ -287,20 +289,14 @@ def _checked_network(
             f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
+    found = (values.inputs, values.actions)
+    if found != (task.observation_size, task.actions):
+        raise RequestError(
+            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
+            f"{task.name} needs {task.observation_size} and {task.actions}"
+        )
+    # They have the shape of Q*, or there would be no such values.
     others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    for network in (values, *others):
-        found = (network.inputs, network.actions)
-        if found != (task.observation_size, task.actions):
-            raise RequestError(
-                f"values of {network.task}: a network of {found[0]} inputs and {found[1]} actions; "
-                f"task {task.name} needs {task.observation_size} and {task.actions}"
-            )
-    for network in others:
-        if network.layout != values.layout:
-            raise RequestError(
-                f"values of {values.task}: further values must come from a network of the same "
-                "shape as Q*"
-            )
     return values, others, values.discount
 
 

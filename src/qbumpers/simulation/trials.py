@@ -1,7 +1,7 @@
 """Simulated learners at any task: `simulate`, and its parts for prepared conditions."""
 
 import itertools
-from typing import Any, Unpack
+from typing import Protocol, Unpack
 
 import numpy as np
 
@@ -71,10 +71,44 @@ def run(
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    return _engine(condition.task).run_block(condition, trials, seed)
+    return engine_of(condition.task).run_block(condition, trials, seed)
 
 
-def _engine(task: Task) -> Any:
+class Engine(Protocol):
+    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`."""
+
+    def run_block(self, condition: Condition, trials: range, seed: int) -> Simulation:
+        """Simulate trials of a condition, one after another on one core.
+
+        Args:
+            condition: what to simulate.
+            trials: which trials.
+            seed: of the experiment's random streams.
+        """
+        ...
+
+    def record(
+        self,
+        condition: Condition,
+        trials: range,
+        seed: int,
+        script: Script | None,
+        interpreted: bool = False,
+    ) -> Step:
+        """Every step of training of one trial; `qbumpers.simulation.record` says more.
+
+        Args:
+            condition: what to simulate.
+            trials: the one trial.
+            seed: of the experiment's random streams.
+            script: proposals and noise to be played again; None to draw them.
+            interpreted: whether to run compiled code as plain Python, to be compared with.
+        """
+        ...
+
+
+def engine_of(task: Task) -> Engine:
+    """The engine for a task: by whether its states are numbered or observed as vectors."""
     return tabular if task.states else deep
 
 
@@ -109,7 +143,7 @@ def record(
     if script is not None:
         _check_script(script, condition.task.actions)
     trials = _checked_trials(range(trial, trial + 1), seed)
-    return _engine(condition.task).record(condition, trials, seed, script)
+    return engine_of(condition.task).record(condition, trials, seed, script)
 
 
 def _checked_trials(trials: int | range, seed: int) -> range:

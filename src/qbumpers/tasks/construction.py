@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.checking import check_rows
+from qbumpers.tasks.checking import normalised_rows
 
 Judge = Callable[[int, int, int, float, bool], bool]
 """`(state, action, next_state, reward, terminated) -> bool`."""
@@ -16,17 +17,17 @@ Table = Mapping[int, Mapping[int, list[tuple[float, int, float, bool]]]]
 
 
 def outcomes_of_arrays(
-    transition: np.ndarray,
-    reward: np.ndarray,
-    terminal: np.ndarray,
-    success: np.ndarray | None,
-    crash: np.ndarray | None,
+    transition: ArrayLike,
+    reward: ArrayLike,
+    terminal: ArrayLike,
+    success: ArrayLike | None,
+    crash: ArrayLike | None,
 ) -> dict[str, np.ndarray | None]:
     """The outcomes [S, A, K] of each action; see `TabularTask.from_arrays`."""
     transition = np.asarray(transition, np.float64)
     if transition.ndim != 3 or transition.shape[0] != transition.shape[2]:
         raise RequestError(f"transition has shape {transition.shape}; [S, A, S] is needed")
-    check_rows("transition", transition)
+    transition = normalised_rows("transition", transition)
     states, actions, _ = transition.shape
     outcomes = max(1, int((transition > 0).sum(axis=2).max()))
     # Possible outcomes first: the others' probability is 0 and they are never drawn.
@@ -49,7 +50,7 @@ def outcomes_of_arrays(
     }
 
 
-def start_distribution(start: np.ndarray | int, states: int) -> np.ndarray:
+def start_distribution(start: ArrayLike, states: int) -> np.ndarray:
     """Distribution of the first state, float64 [S], if it may be given as one state."""
     if np.ndim(start):
         return np.asarray(start, np.float64)
@@ -75,6 +76,10 @@ def outcomes_of_table(
         for k, row in enumerate(table[s][a]):
             place = s, a, k
             probability[place], next_state[place], reward[place], terminated[place] = row
+            if next_state[place] != row[1]:
+                raise RequestError(
+                    f"table[{s}][{a}]: next state = {row[1]!r}; a whole number is needed"
+                )
     if success is None and crash is None:
         events = _endings(terminated, reward, probability)
     else:
@@ -138,7 +143,7 @@ def description_of(environment: Any, episode_limit: int | None) -> dict[str, Any
     }  # fmt: skip
 
 
-def _state_flags(name: str, flags: np.ndarray, states: int) -> np.ndarray:
+def _state_flags(name: str, flags: ArrayLike, states: int) -> np.ndarray:
     array = np.asarray(flags, np.bool_)
     if array.shape != (states,):
         raise RequestError(

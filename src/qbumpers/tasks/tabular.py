@@ -9,8 +9,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import TimeLimit
+from numpy.typing import ArrayLike
 
-from qbumpers.tasks.checking import check_arrays, check_cells, check_common
+from qbumpers.errors import RequestError
+from qbumpers.tasks.checking import check_arrays, check_cells, check_common, normalised_rows
 from qbumpers.tasks.construction import (
     Judge,
     Table,
@@ -24,6 +26,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.task import distance_between
 
 
@@ -82,6 +85,9 @@ class TabularTask:
     def __post_init__(self) -> None:
         """Check every field."""
         check_arrays(self)
+        for field in ("probability", "start"):
+            rows = normalised_rows(f"task {self.name}: {field}", getattr(self, field))
+            object.__setattr__(self, field, rows)
         check_common(self, self.make_display)
         check_cells(self)
 
@@ -141,6 +147,16 @@ class TabularTask:
             episode_limit=int(self.episode_limit),
         )
 
+    def make_stepper(self) -> Stepper:
+        """Refused: its states are numbered.
+
+        Raises:
+            RequestError: always.
+        """
+        raise RequestError(
+            f"task {self.name}: its states are numbered; observations that are vectors are needed"
+        )
+
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
@@ -175,16 +191,16 @@ class TabularTask:
     @classmethod
     def from_arrays(
         cls,
-        transition: np.ndarray,
-        reward: np.ndarray,
-        terminal: np.ndarray,
-        start: np.ndarray | int,
+        transition: ArrayLike,
+        reward: ArrayLike,
+        terminal: ArrayLike,
+        start: ArrayLike,
         *,
         discount: float,
         episode_limit: int,
         name: str = "task",
-        success: np.ndarray | None = None,
-        crash: np.ndarray | None = None,
+        success: ArrayLike | None = None,
+        crash: ArrayLike | None = None,
         grid: tuple[int, int] | None = None,
     ) -> "TabularTask":
         """A task from the arrays that textbooks use.
@@ -217,7 +233,7 @@ class TabularTask:
     def from_table(
         cls,
         table: Table,
-        start: np.ndarray,
+        start: ArrayLike,
         *,
         discount: float,
         episode_limit: int,

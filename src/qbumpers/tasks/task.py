@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 
 from qbumpers.tasks.dynamics import Dynamics
+from qbumpers.tasks.stepping import Stepper
 
 
 class Task(Protocol):
@@ -118,6 +119,14 @@ class Task(Protocol):
 
         Raises:
             RequestError: if observations are vectors.
+        """
+        ...
+
+    def make_stepper(self) -> Stepper:
+        """The task as simulators of vector observations step through it.
+
+        Raises:
+            RequestError: if states are numbered.
         """
         ...
 

@@ -9,7 +9,8 @@ from gymnasium import wrappers
 from qbumpers.errors import RequestError
 
 # Nothing that they keep decides what later steps give, or it counts the step, which has happened.
-_HARMLESS = (
+# Classes derived from these may keep something of their own, so each is named.
+_HARMLESS = {
     wrappers.PassiveEnvChecker,
     wrappers.OrderEnforcing,
     wrappers.TimeLimit,
@@ -17,9 +18,22 @@ _HARMLESS = (
     wrappers.RecordVideo,
     wrappers.HumanRendering,
     wrappers.TransformObservation,
+    wrappers.AddRenderObservation,
+    wrappers.DiscretizeObservation,
+    wrappers.DtypeObservation,
+    wrappers.FilterObservation,
+    wrappers.FlattenObservation,
+    wrappers.GrayscaleObservation,
+    wrappers.RescaleObservation,
+    wrappers.ReshapeObservation,
+    wrappers.ResizeObservation,
     wrappers.TransformReward,
+    wrappers.ClipReward,
     wrappers.TransformAction,
-)
+    wrappers.ClipAction,
+    wrappers.DiscretizeAction,
+    wrappers.RescaleAction,
+}
 
 Snapshot = Callable[[], Any]
 Restore = Callable[[Any], None]
@@ -48,7 +62,7 @@ def undo_of(environment: gymnasium.Env[Any, Any]) -> tuple[Snapshot, Restore]:
             return undoing.snapshot, undoing.restore
         if not isinstance(layer, gymnasium.Wrapper):
             break
-        if not isinstance(layer, _HARMLESS):
+        if kind not in _HARMLESS:
             raise RequestError(
                 f"wrapper {kind.__name__} may keep something that an undone step would not put "
                 "back: give it methods snapshot and restore, or leave it out"
