@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from qbumpers.compilation import CompilationError, compiled_for_session, is_compiled
+from qbumpers.compilation import CompilationError, compiled_for_session, compiles, is_compiled
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
@@ -91,6 +91,8 @@ def compiled_or_plain(
     Returns:
         The functions, and what they compile for: nothing if they are plain Python.
     """
+    if not compiles():
+        return functions, frozenset()
     session = tuple(
         f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
     )
@@ -211,9 +213,12 @@ def _numbers_in(name: str, field: str) -> np.ndarray:
     if name in _kept.get():
         return _kept.get()[name]
     try:
-        found = np.load(name) if Path(name).suffix == ".npy" else np.loadtxt(name, delimiter=",")
+        if Path(name).suffix == ".npy":
+            found = np.load(name)
+        else:
+            found = np.loadtxt(name, delimiter=",", encoding="utf-8-sig", ndmin=2)
         numbers = np.ascontiguousarray(np.atleast_2d(found), np.float64)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise RequestError(
             f"{field} = {name!r}: not a .npy or .csv file of numbers ({reason})"

@@ -1,6 +1,5 @@
 """What a run writes, and that its numbers depend on nothing but the experiment."""
 
-import os
 import platform
 import tomllib
 from importlib.metadata import version
@@ -16,6 +15,7 @@ from qbumpers.experiments import cells
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.simulation import simulate
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import load_values, solve
 from tests.experiments.examples import (
@@ -272,7 +272,7 @@ def test_fewer_than_one_worker_is_refused(tmp_path, workers):
 
 
 def test_all_cores_are_used_unless_fewer_are_asked_for():
-    assert ThisMachine().cores == os.cpu_count()
+    assert ThisMachine().cores == usable_cores()
     assert ThisMachine(3).cores == 3
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Annotated, Any
 
 from qbumpers.assistants.compiling import Kind, compile_functions
-from qbumpers.compilation import is_of_package, uncompiled
+from qbumpers.compilation import is_compiled, is_of_package, uncompiled
 from qbumpers.decisions import Decision
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.registration import (
@@ -129,7 +129,7 @@ def register_assistant(
         built_in = is_of_package(function) and all(map(is_written_here, others))
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),
-            frozenset({"states", "vectors"}), built_in, revision,
+            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in, revision,
         )  # fmt: skip
         if not built_in:
             rule = _of_user(rule)

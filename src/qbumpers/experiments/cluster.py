@@ -26,6 +26,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.simulation import Condition
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.packing import packed
 
 BATCH_SECONDS = 2.0
@@ -82,7 +83,9 @@ class RayCluster:
         return self
 
     def _connect(self) -> None:
-        settings = {**_QUIET, "include_dashboard": False} if self.address == LOCAL else _QUIET
+        settings: dict[str, Any] = dict(_QUIET)
+        if self.address == LOCAL:
+            settings |= {"include_dashboard": False, "num_cpus": usable_cores()}
         try:
             self._ray.init(self.address, **settings)
         except Exception as error:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from qbumpers.borrowing import read_only
-from qbumpers.compilation import is_of_package, result_type, type_of
+from qbumpers.compilation import is_compiled, is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.registration import (
@@ -113,8 +113,8 @@ def register_learner(
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
     built_in = built_in and all(map(is_written_here, (settings_type, start, begin)))
     learner = LearnerType(
-        name, settings_type, start, choose, prefer, policy, learn, begin, observes, True, built_in,
-        revision,
+        name, settings_type, start, choose, prefer, policy, learn, begin, observes,
+        is_compiled(choose), built_in, revision,
     )  # fmt: skip
     if not built_in:
         learner = _of_user(learner)
