@@ -5,6 +5,7 @@ Results can so be read by programs that know neither the rules nor the learners.
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,8 +16,8 @@ from qbumpers.experiments.design import NamedCondition
 from qbumpers.experiments.identity import Identity
 from qbumpers.experiments.learner_designs import written
 
-CONDITIONS = "conditions.json"
-"""File of the record in an output folder."""
+CONDITIONS, FILES = "conditions.json", "files"
+"""File of the record in an output folder; folder of what is in files that conditions name."""
 
 
 class RecordedCondition(NamedTuple):
@@ -77,7 +78,12 @@ class Record(NamedTuple):
 def file_name(numbers: np.ndarray) -> str:
     """The name under which an output folder keeps the numbers of a file, float64 [N, K]."""
     content = str(numbers.shape).encode() + numbers.tobytes()
-    return f"files/{hashlib.sha256(content).hexdigest()[:16]}.npy"
+    return f"{FILES}/{hashlib.sha256(content).hexdigest()[:16]}.npy"
+
+
+def is_kept_file(name: str) -> bool:
+    """Whether a file in `FILES` is named as `file_name` does."""
+    return re.fullmatch(r"[0-9a-f]{16}\.npy", name) is not None
 
 
 def decoded_record(content: bytes | None) -> Record | None:

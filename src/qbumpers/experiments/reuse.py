@@ -38,20 +38,26 @@ class CellFile(NamedTuple):
     digest: str
 
 
-def _place(content: str) -> str:
+def cells_folder(content: str) -> str:
+    """The folder of the cells of a content, in the output folder."""
     return f"cells/{content[:16]}"
 
 
 def cell_file_name(cell: Cell, kind: str, identity: str, digest: str) -> str:
     """How a table of a cell is named in the output folder."""
     stem = f"{cell.first:06d}-{cell.trials}-{kind.removesuffix('.parquet')}"
-    return f"{_place(cell.content)}/{stem}-{identity}-{digest}.parquet"
+    return f"{cells_folder(cell.content)}/{stem}-{identity}-{digest}.parquet"
+
+
+def is_cell_file(name: str) -> bool:
+    """Whether a file among the cells is named as a table of one is."""
+    return _NAME.fullmatch(name) is not None
 
 
 def cell_files(folder: Folder, content: str) -> list[CellFile]:
     """The tables of all cells of a content; other files there are left out."""
     found = []
-    for name in folder.names(_place(content)):
+    for name in folder.names(cells_folder(content)):
         parts = _NAME.fullmatch(name.rpartition("/")[2])
         if parts is not None:
             cell = Cell(content, int(parts["first"]), int(parts["trials"]))

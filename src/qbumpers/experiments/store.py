@@ -20,9 +20,11 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.record import (
     CONDITIONS,
+    FILES,
     Record,
     RecordedCondition,
     decoded_record,
+    is_kept_file,
     recorded,
 )
 from qbumpers.experiments.reuse import (
@@ -30,6 +32,8 @@ from qbumpers.experiments.reuse import (
     again,
     cell_file_name,
     cell_files,
+    cells_folder,
+    is_cell_file,
     usable_for,
     whole_cells,
 )
@@ -203,6 +207,15 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
+def _clear_left(folder: Folder, records: Sequence[Record]) -> None:
+    """Clear away what killed runs left half-written of their own files, and of no others."""
+    own = {EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES}
+    folder.clear_left("", own.__contains__)
+    folder.clear_left(FILES, is_kept_file)
+    for place in {cells_folder(each.content) for record in records for each in record.conditions}:
+        folder.clear_left(place, is_cell_file)
+
+
 def assembled(
     parts: Sequence[tuple[RecordedCondition, Cell]],
     kind: str,
@@ -270,6 +283,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
                     place.remove(table)
         if before is not None:
             record = record._replace(identities={**before.identities, **record.identities})
+        _clear_left(place, [record, *([before] if before else [])])
         place.write(CONDITIONS, record.encoded())
         place.write(EXPERIMENT, _described(experiment).encode())
         yield Store(place, tables_of(experiment), record, before)
