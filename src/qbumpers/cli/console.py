@@ -16,7 +16,7 @@ OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
 
 @contextlib.contextmanager
 def expert_warnings_printed() -> Iterator[None]:
-    """Print warnings about action values that are no better than random play, a line each."""
+    """Print warnings about action values, a line each."""
     from qbumpers.experts import ExpertWarning
 
     with warnings.catch_warnings(record=True) as caught:

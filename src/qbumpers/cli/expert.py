@@ -31,6 +31,16 @@ def expert(
     check: Annotated[
         Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
     ] = None,
+    convert: Annotated[
+        Path | None,
+        typer.Option(
+            help="Convert this DQN of Stable-Baselines3 in place of training.", metavar="MODEL.zip"
+        ),
+    ] = None,
+    statistics: Annotated[
+        Path | None,
+        typer.Option(help="The file of VecNormalize that goes with --convert.", metavar="FILE.pkl"),
+    ] = None,
     figures: Annotated[
         Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
     ] = None,
@@ -76,6 +86,10 @@ def expert(
     equals, after 50 random actions at the beginning. If the task has no success, mean
     returns decide instead. Training that was stopped goes on with the seeds that are missing.
 
+    A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
+    observations, give the statistics too: its own file does not hold them. Such files can hold
+    code that runs when they are read: open none from strangers.
+
     Example: qbumpers expert lunar-lander --out expert.npz
     """
     from qbumpers.experts.selecting import make_recipe
@@ -84,6 +98,7 @@ def expert(
     made: Any = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
+    _check_conversion(made, check, convert, statistics)
     path = out or Path(f"{task.replace('/', '-')}.npz")
     with stoppable():
         if made.states:
@@ -93,6 +108,8 @@ def expert(
             return
         if check is not None:
             _check(made, check, figures)
+        elif convert is not None:
+            _convert(made, convert, statistics, path)
         else:
             recipe = make_recipe(
                 made,
@@ -105,6 +122,37 @@ def expert(
             _train(made, recipe, list(range(seeds)), path)
         if corrected is not None:
             _correct(made, check or path, corrected)
+
+
+def _check_conversion(
+    task: Any, check: Path | None, convert: Path | None, statistics: Path | None
+) -> None:
+    if convert is None and statistics is not None:
+        raise RequestError(
+            f"--statistics {statistics}: they are of a model; give --convert FILE too"
+        )
+    if convert is not None and check is not None:
+        raise RequestError(
+            f"--convert {convert}: --check only looks at values; give one of the two"
+        )
+    if convert is not None and task.states:
+        raise RequestError(
+            f"--convert {convert}: task {task.name} has a table, it is solved exactly"
+        )
+
+
+def _convert(task: "VectorTask", model: Path, statistics: Path | None, path: Path) -> None:
+    from qbumpers.experts import check_expert, from_stable_baselines
+
+    with expert_warnings_printed():
+        values = from_stable_baselines(model, task, statistics)
+        values.save(path)
+        found = check_expert(task, values)
+    OUTPUT.print(
+        f"{escape(values.method)}: mean return {found.expert.mean:.1f}, of random actions "
+        f"{found.random.mean:.1f}\nValues: [bold]{escape(str(path))}[/bold]",
+        soft_wrap=True,
+    )
 
 
 def _hidden(text: str) -> list[int]:
