@@ -1,6 +1,5 @@
 """Action values of a DQN that was trained by Stable-Baselines3."""
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 from gymnasium import spaces
 
 from qbumpers.errors import RequestError, checked
+from qbumpers.experts.unreadable import why_unreadable
 from qbumpers.networks.network import Network
 from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
@@ -66,12 +66,8 @@ def _loaded(kind: Any, path: Path) -> Any:
         raise RequestError(f"model {path}: there is no such file")
     try:
         return kind.load(path, device="cpu")
-    except (
-        ValueError, KeyError, TypeError, AttributeError, RuntimeError, AssertionError, EOFError,
-        ImportError, OSError, zipfile.BadZipFile,
-    ) as error:  # fmt: skip
-        reason = str(error).partition("\n")[0]
-        raise RequestError(f"model {path}: not a DQN of Stable-Baselines3 ({reason})") from error
+    except Exception as error:  # reading a pickle can raise anything
+        raise RequestError(f"model {why_unreadable(path, error)}") from error
 
 
 def _check_spaces(where: str, model: Any, task: Task) -> None:
