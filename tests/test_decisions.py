@@ -53,8 +53,8 @@ def test_a_situation_holds_the_account_as_it_stands():
     assert situation.values is row
     assert situation.others is others
     assert (situation.state, situation.proposed) == (17, 1)
-    told = [getattr(situation, field) for field in Account._fields]
-    assert told == [-3.0, 0.5, 9.0, 2, 4]
+    seen = [getattr(situation, field) for field in Account._fields]
+    assert seen == [-3.0, 0.5, 9.0, 2, 4]
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ PAGES = {
 }
 RUNNING = ("python", "sh")
 RUN_LANGUAGES = (*RUNNING, "toml", "text")
-INTERNAL = ("borrowing", "cli", "compilation", "errors", "files")
+INTERNAL = ("borrowing", "cli", "compilation", "errors", "files", "source")
 INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
 CITED_HOSTS = {"doi.org", "arxiv.org"}
 
@@ -283,7 +283,7 @@ def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
 
 
 def rewrite(page):
-    """Write what blocks print into the `text` blocks after them, but where those have `...`."""
+    """Write what blocks print into the `text` blocks after them, unless those have `...`."""
     text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         for shown, _, printed in reversed(shown_and_printed(page, Path(folder))):

@@ -69,12 +69,12 @@ def test_a_session_keeps_the_records_of_the_wrapper(perceived):
         while not ended:
             proposed = int(generator.integers(4))
             _, reward, terminated, truncated, info = environment.step(proposed)
-            told = Step(**info["assistance"])
-            decision = session.decide(proposed, Noise(told.coin, told.tie))
-            assert (decision.action, decision.probability) == (told.executed, told.probability)
-            step = session.record(reward, told.next_state, told.events)
+            shown = Step(**info["assistance"])
+            decision = session.decide(proposed, Noise(shown.coin, shown.tie))
+            assert (decision.action, decision.probability) == (shown.executed, shown.probability)
+            step = session.record(reward, shown.next_state, shown.events)
             # The wrapper was reset once more, before the first of these episodes.
-            assert_equal_steps(step._replace(episode=step.episode + 1), told)
+            assert_equal_steps(step._replace(episode=step.episode + 1), shown)
             overridden += step.overridden
             ended = terminated or truncated
             assert (session.values_now is None) == ended

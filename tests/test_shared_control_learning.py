@@ -31,7 +31,7 @@ def train(environment: gymnasium.Env, episodes: int, seed: int) -> np.ndarray:
 
 
 def greedy_returns(table: np.ndarray, seed: int) -> list[float]:
-    """Undiscounted returns of 20 greedy episodes without help, ties broken at random."""
+    """Undiscounted returns of 20 greedy unassisted episodes, ties broken at random."""
     environment = gymnasium.wrappers.RecordEpisodeStatistics(
         gymnasium.make("qbumpers/CliffWalking-v0")
     )
@@ -48,13 +48,13 @@ def greedy_returns(table: np.ndarray, seed: int) -> list[float]:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_learner_under_wide_bumpers_learns_the_task(seed):
-    # Room down to a return of -200 is room to fall off twice. With each of six seeds every greedy
+    # Down to a return of -200 a learner may fall off twice. With each of six seeds every greedy
     # episode afterwards was optimal; two of them are kept.
     environment = gymnasium.wrappers.RecordEpisodeStatistics(
         walking(**bumpers(alpha=1.0, v_min=-200.0)), buffer_length=400
     )
     table = train(environment, 400, seed)
-    assert min(environment.return_queue) >= -200  # help was there: without it, below -1,000
+    assert min(environment.return_queue) >= -200  # assisted: unassisted, below -1,000
     assert greedy_returns(table, seed) == [87.0] * 20
 
 

@@ -1,6 +1,6 @@
 """Arrays that cost nothing in a compiled loop.
 
-Numba counts references to arrays, atomically, even where a loop only reads an element; and the
+Numba counts references to arrays, atomically, even if a loop only reads an element; and the
 length of `table[state]` is known only at run time. Arrays borrowed here are not counted, and rows
 have a length known to the compiler, which then unrolls every loop over actions. Together they make
 the simulation several times as fast. Whoever borrows must hold the array until the loop is over.

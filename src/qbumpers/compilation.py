@@ -37,7 +37,7 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 
 _NEVER_COMPILED = {
     "analysis", "cli", "conformance.py", "experiments", "files.py", "reproduction", "session.py",
-    "shared_control.py", "tuning",
+    "shared_control.py", "source", "tuning",
 }  # fmt: skip
 
 
@@ -253,7 +253,7 @@ def hold(content: Any) -> Held:
 def entered(function: Any, *examples: Any) -> Any:
     """Compiled code for arguments of known types, entered without looking them up at every call.
 
-    The look-up takes microseconds where arguments are tuples. Nothing checks the types any more.
+    The look-up takes microseconds if arguments are tuples. Nothing checks the types any more.
 
     Args:
         function: compiled; one that is not is returned as it is.
@@ -269,7 +269,7 @@ def entered(function: Any, *examples: Any) -> Any:
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python source of a function, to be called where compiled code is no help.
+    """The Python source of a function, to be called if compiled code is no faster.
 
     Handing a few numbers over to compiled code and back takes longer than working them out.
 

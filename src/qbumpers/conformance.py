@@ -41,9 +41,9 @@ class Checked(NamedTuple):
 
     Attributes:
         task: name of the task.
-        host: that was held to the compiled simulator.
-        steps: that were compared.
-        overridden: of them.
+        host: what was held to the compiled simulator, for instance "Session".
+        steps: how many steps were compared.
+        overridden: on how many of them the assistant overrode the learner.
     """
 
     task: str
@@ -58,7 +58,7 @@ def check_conformance(
     """Take an assistant, and a learner if one is given, through every host.
 
     Args:
-        assistant: of a registered rule.
+        assistant: what is taken through the hosts.
         tasks: to try; small ones of this package that the assistant and the learner can do if None.
         **setup: `learner`, `perception`, `motor`, `forgetting`, see `qbumpers.simulation.Setup`.
 
@@ -212,9 +212,9 @@ def check_policy(settings: Any, *, draws: int = 20_000, seed: int = _SEED) -> fl
     less often than once in a million states.
 
     Args:
-        settings: of a registered learner that observes states.
-        draws: of `choose` in each state that is looked at.
-        seed: of the random streams.
+        settings: of a registered learner of numbered states; they select the learner.
+        draws: how often `choose` is called in each state that is looked at.
+        seed: decides what the learner draws.
 
     Returns:
         The largest difference, as a share of the largest that is allowed.

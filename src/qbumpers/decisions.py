@@ -80,11 +80,11 @@ def checked_decision(found: Any, assistant: str) -> Decision:
     Raises:
         RequestError: if it is something else, or not made of numbers.
     """
-    numbers = (int, float, np.number)
+    numbers, given = (int, float, np.number), found
     if not (
         isinstance(found, Decision)
-        and isinstance(found.action, numbers)
-        and isinstance(found.probability, numbers)
+        and isinstance(given.action, numbers)
+        and isinstance(given.probability, numbers)
     ):
         raise RequestError(
             f"assistant {assistant}: its rule returns {found!r}; a Decision is needed, of an "
@@ -104,12 +104,12 @@ class Step(NamedTuple):
         undone: whether the state was taken back to `state` after the action.
         credited: the action that the learner credits with the outcome; -1 if it learns nothing.
         overridden: whether `executed` differs from `proposed`, or the step was undone.
-        probability: of an override, before the coin.
+        probability: that the rule gave an override before the coin was tossed, in [0, 1].
         coin: the noise that decided whether to override.
         tie: the noise that chose among equally good actions.
         values: float64 [A], the assistant's action values in `state`; of a table [N, A].
         projected_return: G(s_t, proposed), see `projected_return`.
-        reward: of the environment for the executed action.
+        reward: what the environment gave for the executed action.
         next_state: where the action led, also if the step was undone.
         events: bits of `qbumpers.tasks.dynamics`; they tell every end of an episode, the step limit
             included.
@@ -140,7 +140,7 @@ class Model(NamedTuple):
         observation_size: D, numbers of an observation; 0 if states are numbered.
         actions: A.
         no_op: the action that does nothing; -1 if there is none.
-        discount: of the assistant's values.
+        discount: with which the assistant's values and the account discount, in (0, 1].
         dynamics: transitions of a task with a table, `qbumpers.tasks.dynamics.Dynamics`; else None.
         distance: float64 [A, A] between actions; 0 on the diagonal and 1 elsewhere if the task
             states none.
@@ -219,7 +219,7 @@ def settle(account: Account, reward: float, discount: float) -> Account:
 
     Args:
         account: before it.
-        reward: of the step.
+        reward: what the environment gave on the step.
         discount: gamma, of the assistant's values.
     """
     return Account(

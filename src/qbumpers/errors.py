@@ -37,7 +37,7 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:
     Args:
         kind: what was named, for instance "assistant".
         name: what the user wrote.
-        known: the names that exist.
+        known: names that would have been right, which the message lists.
 
     Returns:
         The error, to be raised by the caller.
@@ -65,7 +65,7 @@ def from_validation(
     Returns:
         The error, to be raised by the caller.
     """
-    problems = []
+    problems: list[str] = []
     for problem in error.errors(include_url=False):
         field = ".".join(str(part) for part in problem["loc"])
         given = "" if problem["type"] == "missing" else f" = {problem['input']!r}"

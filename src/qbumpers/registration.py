@@ -5,11 +5,14 @@ registration has a class of its own. Compiled code knows numbers, tuples and arr
 among the settings reach it as such.
 """
 
+import contextlib
 import inspect
 import itertools
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextvars import ContextVar
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -25,8 +28,12 @@ from qbumpers.compilation import (
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
+_originals: dict[type, type] = {}
 
 _FILE = "a file of numbers"
+
+_nothing: Mapping[str, np.ndarray] = MappingProxyType({})
+_kept: ContextVar[Mapping[str, np.ndarray]] = ContextVar("kept", default=_nothing)
 
 File = Annotated[str, _FILE]
 """A setting that names a file of numbers, `.npy` or `.csv`; functions get a float64 array."""
@@ -60,10 +67,23 @@ def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], 
     """
 
     def reduce(instance: tuple[Any, ...]) -> Any:
+        """How pickle makes an instance again: by name, as the class there is another."""
         return remade, (name, tuple(instance))
 
     members = {"__slots__": (), "__reduce__": reduce}
-    return type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    fresh = type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    _originals[fresh] = kind
+    return fresh
+
+
+def original_class(kind: type) -> type:
+    """The class that a fresh one was made of; any other class itself."""
+    return _originals.get(kind, kind)
+
+
+def is_written_here(part: Any) -> bool:
+    """Whether a function or class is of this package; so is None, which is nobody's."""
+    return part is None or str(part.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 
 def check_arguments(function: Any, arguments: Sequence[str], where: str) -> None:
@@ -192,6 +212,36 @@ def as_numbers(settings: Any) -> Any:
     )
 
 
+@contextlib.contextmanager
+def files_from(kept: Mapping[str, np.ndarray]) -> Iterator[None]:
+    """Within the block, what is in some files is taken from here: they may have changed by now.
+
+    Args:
+        kept: float64 [N, K] by the name of the file, as settings have it.
+    """
+    before = _kept.set(kept)
+    try:
+        yield
+    finally:
+        _kept.reset(before)
+
+
+def files_in(settings: Any, numbers: Any) -> dict[str, np.ndarray]:
+    """What is in the files that settings name, by the names that they have there.
+
+    Args:
+        settings: a NamedTuple, checked.
+        numbers: the same from `as_numbers`.
+    """
+    found: dict[str, np.ndarray] = {}
+    for value, number in zip(settings, numbers, strict=True):
+        if isinstance(number, np.ndarray):
+            found[value] = number
+        elif hasattr(value, "_fields"):
+            found |= files_in(value, number)
+    return found
+
+
 def _number_of(value: Any, hint: Any, field: str) -> Any:
     if hasattr(value, "_fields"):
         return as_numbers(value)
@@ -209,6 +259,8 @@ def _is_file(hint: Any) -> bool:
 
 def _numbers_in(name: str, field: str) -> np.ndarray:
     """Float64 [N, K], the numbers in a file."""
+    if name in _kept.get():
+        return _kept.get()[name]
     try:
         found = np.load(name) if Path(name).suffix == ".npy" else _numbers_between_commas(name)
         numbers = np.ascontiguousarray(np.atleast_2d(found), np.float64)

@@ -47,7 +47,7 @@ class Session:
     """One learner or participant with one assistant.
 
     Args:
-        assistant: that decides.
+        assistant: what decides, a rule with its options.
         values: Q* of the assistant, any callable from a state or observation to one value per
             action; with `others`, a mapping of further ones by name, if the assistant's rule named
             any.
@@ -58,7 +58,7 @@ class Session:
     Attributes:
         perception: what the learner believes happened, as numbers.
         decision: the decision that awaits its `record`; None if there is none.
-        account: of the episode.
+        account: what was earned in the episode so far, see `qbumpers.decisions.Account`.
         state: the present state, as in `Situation`.
         values_now: float64 [A], the assistant's values in the present state, read-only; None
             between episodes.
@@ -108,7 +108,7 @@ class Session:
 
         Args:
             proposed: in [0, A).
-            noise: of this decision.
+            noise: coin and tie of this decision, for instance `noise_of(seed, number)`.
 
         Raises:
             RequestError: outside an episode, before the last decision was recorded, if there is no
@@ -136,7 +136,7 @@ class Session:
         """The record of the step that was decided, once the action has happened.
 
         Args:
-            reward: of the executed action.
+            reward: what the environment gave for the executed action.
             next_state: where it led, also if the step is undone.
             events: bits of `qbumpers.tasks.dynamics`. Of an undone step only `LIMIT` ends the
                 episode.
@@ -202,8 +202,8 @@ def noise_of(seed: int, number: int) -> Noise:
     """The noise of one decision, by its number alone: a restarted host needs nothing else.
 
     Args:
-        seed: of the session, not negative.
-        number: of the decision, from 0.
+        seed: one per session, not negative.
+        number: which decision of the session, counted from 0.
 
     Returns:
         The same noise for the same arguments.

@@ -69,7 +69,7 @@ def content(address):
 
 
 def number(value, digits=1):
-    """A number as reports write it, a dash where there is none."""
+    """A number as reports write it, a dash if there is none."""
     return "–" if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 

@@ -143,7 +143,7 @@ PERFORMANCE = 1 - 27 / 29
 
 
 def drawn(mean, generator, trials=100):
-    """Trials whose two measures are correlated, as those of one person are."""
+    """Trials whose two measures are correlated, as those of one learner are."""
     covariance = [[4.0, 12.0], [12.0, 1600.0]]
     return generator.multivariate_normal(mean, covariance, trials)
 

@@ -140,7 +140,7 @@ def test_intervals_of_differences_cover_the_truth_with_unequal_variances_or_pair
 
 @given(arrays(np.float64, st.integers(1, 7), elements=st.floats(0, 1)))
 def test_adjusted_p_values_are_holms(p_values):
-    # Holm's procedure is the closed test with Bonferroni's: a hypothesis falls at a level where
+    # Holm's procedure is the closed test with Bonferroni's: a hypothesis falls at a level if
     # every set of hypotheses that it belongs to does.
     numbers = range(len(p_values))
     sets = [s for size in numbers for s in itertools.combinations(numbers, size + 1)]

@@ -215,7 +215,7 @@ def test_learners_count_towards_the_cells():
 
 
 def test_episodes_alone_count_towards_the_cells():
-    """Cells hold fewer trials where people go on alone: the same cells as the run will have."""
+    """Cells hold fewer trials if learners go on unassisted: the same cells as the run will have."""
     changes = {"episodes": 10, "retention": 49_990, "assistants": NONE}
     with pytest.raises(RequestError, match=r"1 conditions?, together 10,001 cells"):
         make_experiment(settings(trials=MANY_CELLS + 1, **changes))

@@ -1,4 +1,4 @@
-"""Whoever makes a plan is warned, before any work, of values that say nothing about assistance."""
+"""Making a plan warns, before any work, of values that say nothing about assistance."""
 
 import pytest
 

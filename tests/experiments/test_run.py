@@ -45,7 +45,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture
 def small_blocks(monkeypatch):
-    """Two trials a cell, so that five trials make three cells of a condition."""
+    """Two trials per cell, so that five trials make three cells of a condition."""
     monkeypatch.setattr(cells, "EPISODES_A_CELL", 2 * 4)
 
 
@@ -53,6 +53,7 @@ def test_a_run_writes_its_design_cells_tables_and_values(folder):
     names = {path.name for path in folder.iterdir()}
     assert names - {".lock"} == {
         "experiment.toml",
+        "conditions.json",
         "cells",
         "episodes.parquet",
         "states.parquet",
@@ -68,7 +69,7 @@ def test_the_design_as_run_can_be_run_again_and_says_where_it_ran(folder):
     assert written["learners"][0]["epsilon"] == {"start": 1.0, "end": 0.02, "fraction": 0.9}
     libraries = ("numpy", "numba", "scipy", "polars")
     assert written["run"] == {
-        "format": 2,
+        "format": 3,
         **{name: version(name) for name in libraries},
         "version": qbumpers.__version__,
         "python": platform.python_version(),
@@ -106,7 +107,7 @@ def test_the_rows_are_those_of_the_simulation(folder):
 
 
 def test_success_and_crash_are_what_returns_say_they_are(tmp_path):
-    # Enough episodes for some walkers to arrive alone and for some not to.
+    # Enough episodes for some walkers to arrive unassisted and for some not to.
     table = pl.read_parquet(run_into(tmp_path, episodes=50, trials=40) / "episodes.parquet")
     for who in ("assisted", "unassisted"):
         columns = (f"{who}_return", f"{who}_length", f"{who}_success", f"{who}_crash")
@@ -238,14 +239,14 @@ def test_episodes_alone_follow_those_with_the_assistant(tmp_path):
     assert episodes["episode"].to_list() == [list(range(7))] * 3 * 5
     assert episodes["retention"].to_list() == [[False] * 4 + [True] * 3] * 3 * 5
     assert table.filter("retention")["overrides"].to_list() == [0] * 3 * 5 * 3
-    helped = table.filter(~pl.col("retention"))
+    assisted = table.filter(~pl.col("retention"))
     states = pl.read_parquet(tmp_path / "states.parquet")
     for who in ("assisted", "unassisted"):
-        steps = helped.group_by("condition", maintain_order=True).agg(pl.sum(f"{who}_length"))
+        steps = assisted.group_by("condition", maintain_order=True).agg(pl.sum(f"{who}_length"))
         counted = states.group_by("condition", maintain_order=True).agg(pl.sum(who))
         assert counted.rows() == steps.rows()
     without = pl.read_parquet(run_into(tmp_path / "without") / "episodes.parquet")
-    assert helped.equals(without)
+    assert assisted.equals(without)
 
 
 def test_trials_that_share_numbers_are_those_of_the_simulation(tmp_path):

@@ -114,7 +114,7 @@ def test_a_thousand_updates_stay_together(clip):
     assert np.abs(memory.target - memory.parameters).max() > 1e-3
 
 
-# Sums of products are rounded once where the compiled learner's are, so that bits can be compared.
+# Sums of products are rounded once wherever the compiled learner's are: bits can be compared.
 @numba.njit(error_model="numpy")
 def fused_adam(parameters, moments, gradient, rate, updates):
     """Adam in float32 without any flush."""

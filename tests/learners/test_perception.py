@@ -58,7 +58,7 @@ def test_who_credits_the_own_action_with_an_undone_step_believes_that_it_led_bac
     experience = read(named(name), PROPOSED, undone=True)
     assert experience.led_back == led_back
     transition = believed(experience, 7, 9, True)
-    # Where it led back, nothing ended; where it is seen to have led on, that would have ended.
+    # If it led back, nothing ended; if it is seen to have led on, that would have ended.
     expected = (7, 7, False) if led_back else (7, 9, True)
     assert (transition.state, transition.next_state, transition.terminated) == expected
 

@@ -172,8 +172,8 @@ def test_trials_do_not_depend_on_their_company_or_on_processes():
 def test_common_random_numbers_begin_every_episode_alike():
     settings = {"common_random_numbers": True, "episodes": 6}
     none = in_the_corridor(**settings)
-    helped = in_the_corridor("maximal", **settings)
-    first, second = (record(c) for c in (none, helped))
+    assisted = in_the_corridor("maximal", **settings)
+    first, second = (record(c) for c in (none, assisted))
     for episode in range(6):
         begins = [np.argmax(steps.episode == episode) for steps in (first, second)]
         np.testing.assert_array_equal(first.state[begins[0]], second.state[begins[1]])

@@ -73,7 +73,7 @@ def test_counts_and_lengths_tell_the_same_number_of_steps():
 
 
 def one_step_task(first_ends):
-    """Two actions, one step: 0 pays 1, 1 pays 2; the second always ends, the first as told.
+    """Two actions, one step: 0 pays 1, 1 pays 2; the second always ends, the first as asked.
 
     Where the first does not end, the episode is cut off all the same, by its limit of one step.
     """
@@ -92,7 +92,7 @@ def one_step_task(first_ends):
 @pytest.mark.parametrize(("first_ends", "greedy_return"), [(False, 1.0), (True, 2.0)])
 def test_truncation_is_bootstrapped_through_and_termination_is_not(first_ends, greedy_return):
     # With values of 5 at first and a rate of 1, the first action is learned to be worth
-    # 1 + 0.5 * 5 = 3.5 where the limit cuts the episode off and 1 where it ends; the second is
+    # 1 + 0.5 * 5 = 3.5 if the limit cuts the episode off and 1 if it ends; the second is
     # worth 2, and would be 4.5 if the end were bootstrapped through.
     learner = QLearner(0.5, epsilon=CONSTANT, learning_rate=CONSTANT, initial_value=5.0)
     condition = make_condition(one_step_task(first_ends), "none", learner=learner, episodes=30)

@@ -83,13 +83,13 @@ def test_a_delivery_is_a_success_and_the_taxi_cannot_crash():
     assert not present(task.crash).any()
 
 
-def test_the_cliff_of_gymnasium_states_no_success_unless_told():
+def test_the_cliff_of_gymnasium_states_no_success_unless_asked():
     task = task_of("cliff")
     assert task.success is None
     assert task.crash is None
-    told = task_of("cliff", crash=lambda s, a, to, reward, ends: reward == -100)
-    assert (told.crash == (told.reward == -100)).all()
-    assert present(told.crash).any()
+    judged = task_of("cliff", crash=lambda s, a, to, reward, ends: reward == -100)
+    assert (judged.crash == (judged.reward == -100)).all()
+    assert present(judged.crash).any()
 
 
 def test_a_map_is_a_grid_only_where_its_cells_are_the_states():

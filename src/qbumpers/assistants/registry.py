@@ -14,6 +14,8 @@ from qbumpers.registration import (
     checked_class,
     compiled_or_plain,
     fresh_class,
+    is_written_here,
+    original_class,
     sample,
 )
 
@@ -43,6 +45,7 @@ class Rule:
         compiles_for: "states" or "vectors" if Numba compiled it for such tasks; empty if it runs as
             plain Python.
         built_in: whether it belongs to this package, whose compiled code is kept on disk.
+        revision: raised when the numbers that it gives change although its code does not show it.
     """
 
     name: str
@@ -55,6 +58,13 @@ class Rule:
     values: tuple[str, ...]
     compiles_for: frozenset[str]
     built_in: bool
+    revision: int = 1
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """What it was registered with: its functions, None for those it lacks, and its options."""
+        functions = (self.decide, self.start, self.observe, self.check_start)
+        return (*functions, original_class(self.options_type))
 
     @property
     def compiled(self) -> bool:
@@ -80,6 +90,7 @@ def register_assistant(
     check_start: Callable[[Any, float], None] | None = None,
     needs: Sequence[str] = (),
     values: Sequence[str] = (),
+    revision: int = 1,
 ) -> Callable[[Callable[..., Decision]], Callable[..., Decision]]:
     """Register a decision rule under a name; it then works in every host.
 
@@ -98,6 +109,9 @@ def register_assistant(
         needs: of `NEEDS`, what the rule cannot do without; a task that cannot give it is refused.
         values: names of further rows of values that the assistant's values must hold beside Q*, in
             the order in which the rule finds them in `Situation.others`.
+        revision: to be raised when the rule gives other numbers for a reason that its code does not
+            show, for instance a file that it opens by itself; finished trials are then simulated
+            again.
 
     Returns:
         A decorator for the rule, `(situation, noise, options) -> Decision`. The rule is compiled
@@ -111,11 +125,13 @@ def register_assistant(
     arguments = ("situation", "noise", "options", *(() if start is None else ("memory",)))
 
     def decorate(function: Callable[..., Decision]) -> Callable[..., Decision]:
+        """Register the rule, compiled if possible; the function itself stays what it was."""
         check_arguments(function, arguments, f"rule {name!r}")
-        built_in = is_of_package(function)
+        others = (options_type, start, observe, check_start)
+        built_in = is_of_package(function) and all(map(is_written_here, others))
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),
-            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in,
+            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in, revision,
         )  # fmt: skip
         if not built_in:
             rule = _of_user(rule)

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Annotated, Any
 
 import typer
@@ -70,7 +70,7 @@ def main() -> None:
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable() -> Generator[None, None, None]:
     """End at once on Ctrl-C or SIGTERM, with a message; Typer would end without one."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -6,7 +6,7 @@ import io
 import math
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any
 
 from rich.console import Console
@@ -49,8 +49,8 @@ def print_warning(message: Warning | str, *_: Any) -> None:
 
 
 @contextlib.contextmanager
-def expert_warnings_printed() -> Iterator[None]:
-    """Print warnings about action values that are no better than random play, a line each."""
+def expert_warnings_printed() -> Generator[None, None, None]:
+    """Print warnings about action values, a line each."""
     from qbumpers.experts import ExpertWarning
 
     with warnings.catch_warnings(record=True) as caught:

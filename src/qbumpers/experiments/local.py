@@ -1,4 +1,4 @@
-"""Cells on this machine: threads where compiled loops let each other run, else processes."""
+"""Cells on this machine: threads if compiled loops let each other run, else processes."""
 
 import itertools
 from collections.abc import Generator, Iterable
@@ -14,13 +14,13 @@ from qbumpers.simulation.workers import make_pool, some_finished, submit
 
 
 class ThisMachine:
-    """Cores of this machine: threads of this process, or processes where a task needs them.
+    """Cores of this machine: threads of this process, or processes if a task needs them.
 
     Args:
-        workers: how many; all usable cores where None.
+        workers: how many; all usable cores if None.
 
     Raises:
-        RequestError: where `workers` is below 1.
+        RequestError: if `workers` is below 1.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -32,14 +32,14 @@ class ThisMachine:
         """Do the work of cells and yield each as it is finished, in any order.
 
         Args:
-            plan: the experiment.
-            seconds: the cells, with how long each will take.
+            plan: the experiment whose conditions the cells belong to.
+            seconds: the cells to be done, with the seconds that each is expected to take.
 
         Yields:
             Finished cells; a closed generator leaves what has begun unfinished.
 
         Raises:
-            ChildProcessError: where a process was lost, for instance for want of memory.
+            ChildProcessError: if a process was lost, for instance for want of memory.
         """
         remaining: Iterable[Cell] = iter(seconds)
         waiting: set[Future[Finished]] = set()

@@ -32,9 +32,10 @@ class RunProgress(NamedTuple):
     Attributes:
         trials: finished, those of an earlier run included.
         of: trials of the whole experiment.
-        steps: that learners took in this run.
+        steps: how many steps learners took in this run.
         expected: seconds that this run will take, by calibration, from its start.
         damaged: files of an earlier run that were damaged; their trials are run again.
+        changed: why finished trials of an earlier run are simulated again, a sentence each.
     """
 
     trials: int
@@ -42,6 +43,7 @@ class RunProgress(NamedTuple):
     steps: int
     expected: float
     damaged: list[str]
+    changed: list[str]
 
 
 def run_experiment(
@@ -60,14 +62,14 @@ def run_experiment(
         report: called with the progress at first and after each cell, from the calling thread.
 
     Raises:
-        RequestError: where the folder holds another experiment, or another run is writing to it.
-        StoreError: where results cannot be written; finished cells stay.
+        RequestError: if the folder holds another experiment, or another run is writing to it.
+        StoreError: if results cannot be written; finished cells stay.
     """
     backend = backend or ThisMachine()
     design = plan.experiment
-    with open_store(folder, design) as store:
-        store.write_values(plan.values)
-        found = store.survey(plan.conditions)
+    with open_store(folder, design, plan.record) as store:
+        store.write_inputs(plan.values, plan.files)
+        found = store.survey(design.trials)
         cells = {
             content: tiles(content, design.trials, design.trials_a_cell(), found.cells[content])
             for content in plan.conditions
@@ -82,7 +84,7 @@ def run_experiment(
         seconds = estimated_seconds(plan, missing)
         expected = sum(seconds.values()) / backend.cores
         done = total - sum(cell.trials for cell in missing)
-        progress = RunProgress(done, total, 0, expected, found.damaged)
+        progress = RunProgress(done, total, 0, expected, found.damaged, found.changed)
         report(progress)
         with contextlib.closing(backend(plan, seconds)) as work:
             for finished in work:
@@ -92,4 +94,4 @@ def run_experiment(
                     steps=progress.steps + finished.steps,
                 )
                 report(progress)
-        store.assemble([(named, cells[content]) for named, content in plan.named])
+        store.assemble(cells)

@@ -11,7 +11,25 @@ from pydantic import ValidationError
 from qbumpers.errors import RequestError, from_validation
 from qbumpers.experiments.cells import MANY_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign
-from qbumpers.experiments.learner_designs import field_names
+from qbumpers.experiments.learner_designs import RECORDED, field_names
+
+
+def recorded_experiment(settings: dict[str, Any], where: str) -> Experiment:
+    """The experiment of a run, as its output folder notes it.
+
+    What it names, rules, learners, tasks and files, need not be there any more.
+
+    Args:
+        settings: of the run, every field spelt out.
+        where: for messages, for example the path of the file.
+
+    Raises:
+        RequestError: naming each field that is wrong, its value and what is allowed.
+    """
+    try:
+        return Experiment.model_validate(settings, context=RECORDED)
+    except ValidationError as error:
+        raise from_validation(error, where, _field_names()) from error
 
 
 def make_experiment(
@@ -56,7 +74,7 @@ def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
     """An experiment from a TOML file.
 
     Args:
-        path: of the file.
+        path: where the file is.
         large: whether more than `MANY_CELLS` cells of work are meant.
 
     Returns:
@@ -78,7 +96,7 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
     """What a TOML file says.
 
     Args:
-        content: of the file.
+        content: the bytes of the file.
         where: for the message, for example the path of the file.
 
     Returns:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,8 +49,8 @@ def judge(task: Task, values: NetworkValues, *, episodes: int = EPISODES) -> Jud
 
     Args:
         task: what it is to be good at.
-        values: of the expert.
-        episodes: of each setting, at least 1.
+        values: Q* of the expert.
+        episodes: how many are played in each of `SETTINGS`, at least 1.
 
     Returns:
         The judgement; equal values are judged alike.
@@ -98,8 +99,8 @@ def train_several(
 
     Args:
         task: what they are to be good at.
-        recipe: of all of them.
-        seeds: of the random numbers, not negative.
+        recipe: how each of them is trained.
+        seeds: one per expert; each decides all chance of its training; not negative.
         folder: where each is kept.
         report: called with a seed and its steps done.
 
@@ -109,16 +110,12 @@ def train_several(
     Raises:
         RequestError: as `train_expert`, and if a kept file is damaged.
     """
-    experts = []
+    experts: list[NetworkValues] = []
     for seed in seeds:
         content = content_digest([task.digest(), recipe.words(seed)]).hex()
         path = folder / f"seed-{seed}-{content[:12]}.npz"
         if not path.exists():
-
-            def report_steps(steps: int, seed: int = seed) -> None:
-                report(seed, steps)
-
-            train_expert(task, recipe, seed=seed, report=report_steps).save(path)
+            train_expert(task, recipe, seed=seed, report=partial(report, seed)).save(path)
         values = load_values(path)
         if not isinstance(values, NetworkValues):
             raise RequestError(f"{path}: a table of values; delete it, it is not of this training")

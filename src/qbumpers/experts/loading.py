@@ -12,8 +12,8 @@ def load_network(task: Task, path: str | Path) -> NetworkValues:
     """The network of a values file.
 
     Args:
-        task: the task that it must be of.
-        path: of the file.
+        task: whose observations, actions and name it must have.
+        path: where the file is.
 
     Raises:
         RequestError: if the file cannot be read, holds a table, or is of another task or shape.
@@ -34,8 +34,8 @@ def load_table(task: Task, path: str | Path) -> TabularValues:
     """The table of a values file.
 
     Args:
-        task: the task whose states and actions it must have.
-        path: of the file.
+        task: whose states and actions it must have.
+        path: where the file is.
 
     Raises:
         RequestError: if the file cannot be read, holds a network, or a table of another shape.

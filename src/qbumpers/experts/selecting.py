@@ -1,4 +1,4 @@
-"""Training several experts by the paper's recipe, and keeping the best of them in a file."""
+"""Training several experts by the paper's recipe, and storing the best of them in a file."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -42,10 +42,10 @@ def make_recipe(
 
     Args:
         task: to be learned.
-        steps: of training.
+        steps: environment steps of training, of each expert.
         hidden: units of each hidden layer.
-        activation: of hidden units, "tanh" or "relu".
-        learning_rate: of Adam.
+        activation: what hidden units do, "tanh" or "relu".
+        learning_rate: step size of Adam.
         random_start: random actions before each episode of training.
 
     Raises:
@@ -73,10 +73,10 @@ def train_best(
     Finished experts are in a folder beside the file, and are not trained again.
 
     Args:
-        task: the task.
-        recipe: of all of them.
-        seeds: of the random numbers, not negative.
-        path: of the file; "PATH.work" is the folder.
+        task: what they are to be good at.
+        recipe: how each of them is trained.
+        seeds: one per expert; each decides all chance of its training; not negative.
+        path: where the best goes; "PATH.work" is the folder of all.
         report: called with a seed and its steps done.
 
     Raises:

@@ -15,7 +15,7 @@ class TableCheck(NamedTuple):
     Attributes:
         start_values: V of each state that an episode may start in.
         pairs: number of states that an episode can act in, times actions: those compared.
-        largest_error: the largest size of an error.
+        largest_error: largest absolute difference from the exact value, in reward units.
         mean_error: mean of value minus exact value.
     """
 
@@ -29,8 +29,8 @@ def check_exactness(task: Task, values: TabularValues) -> TableCheck:
     """Compare a table with the exact solution at its own discount.
 
     Args:
-        task: the task.
-        values: of the expert.
+        task: what the table is of.
+        values: the table that is checked, [S, A].
 
     Raises:
         RequestError: if the task has no table of transitions or the exact values do not exist.

@@ -26,7 +26,7 @@ class Recipe(NamedTuple):
 
     Attributes:
         learner: the Double DQN; its schedule of epsilon runs over steps here, not episodes.
-        steps: of training.
+        steps: environment steps of training.
         random_start: random actions that every episode of training begins with.
     """
 
@@ -58,7 +58,7 @@ def train_expert(
     Args:
         task: what it is to be good at.
         recipe: how it is trained.
-        seed: of all random streams, not negative.
+        seed: decides all chance of the training; not negative.
         report: called now and then with the steps done.
 
     Returns:

@@ -55,7 +55,7 @@ def _policy_in(members: dict[str, bytes]) -> str:
 
 def _small_members(path: Path) -> dict[str, bytes]:
     """What a model says of itself, by the name of its part; nothing of what is damaged."""
-    members = {}
+    members: dict[str, bytes] = {}
     with zipfile.ZipFile(path) as archive:
         for name in ("_stable_baselines3_version", "data"):
             with contextlib.suppress(KeyError, RuntimeError, zipfile.BadZipFile, zlib.error):

@@ -24,15 +24,15 @@ def visited_episodes(task: Task, values: NetworkValues, learners: int, seed: int
 
     Args:
         task: what is learned.
-        values: of the expert.
+        values: Q* of the expert, of which greedy actions are taken.
         learners: how many, each from its first episode on.
-        seed: of the random numbers, not negative.
+        seed: decides all that learners and policies draw; not negative.
 
     Returns:
         The episodes.
     """
     generator = np.random.default_rng([seed, 0])
-    visited = []
+    visited: list[Episode] = []
     for number in range(learners):
         streams = trial_streams(seed, ["evaluated", task.digest()], range(number, number + 1))[0]
         visited += _learning_episodes(task, values.discount, streams)
@@ -49,9 +49,9 @@ class _LearningStepper:
     """An environment whose every step a learner learns from.
 
     Args:
-        stepper: the environment.
-        settings: of the learner, as numbers.
-        memory: of the learner.
+        stepper: what is stepped.
+        settings: how the learner learns, as numbers.
+        memory: what the learner knows, changed in place after every step.
         stream: uint64 [4], random stream of its batches.
     """
 
@@ -86,7 +86,7 @@ def _learning_episodes(task: Task, discount: float, streams: np.ndarray) -> list
     stepper = _LearningStepper(task.make_stepper(), settings, memory, streams[EVALUATION])
     nothing = np.zeros(task.observation_size, np.float32)
     propose = entered(choose, settings, memory, nothing, rates, streams[LEARNER])
-    episodes = []
+    episodes: list[Episode] = []
     for number in range(_EPISODES):
         now = rates._replace(epsilon=scheduled(learner.epsilon, number, _EPISODES))
 

@@ -6,6 +6,9 @@ sum runs in one fixed order and every multiplication and addition is fused (roun
 wide the registers are. For matrices as small as a learner's that is also faster.
 """
 
+# llvmlite has no types, Numba few.
+# pyright: basic
+
 from collections.abc import Callable
 from typing import Any
 
@@ -62,6 +65,7 @@ def zeros(typing: Any, numbers: Any, width: Any) -> Any:
     vector = Vector(numbers.dtype, width.literal_value)
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The zeros as a constant of LLVM."""
         return ir.Constant(context.get_value_type(vector), None)
 
     return vector(numbers, width), build
@@ -72,6 +76,7 @@ def load(typing: Any, numbers: Any, at: Any, like: Any) -> Any:
     """Numbers of a contiguous array from a place on, as many as `like` has."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One load of all the numbers."""
         pointer = _pointer(context, builder, numbers, arguments, like)
         return builder.load(pointer, align=numbers.dtype.bitwidth // 8)
 
@@ -83,6 +88,7 @@ def store(typing: Any, numbers: Any, at: Any, vector: Any) -> Any:
     """Write a vector into a contiguous array from a place on."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One store of all the numbers."""
         pointer = _pointer(context, builder, numbers, arguments, vector)
         builder.store(arguments[2], pointer, align=numbers.dtype.bitwidth // 8)
         return context.get_dummy_value()
@@ -102,6 +108,7 @@ def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
     number = total.number if isinstance(total, Vector) else total
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One fused multiply-add of all lanes; a plain number stands in each of them."""
         kind = arguments[2].type
         splats = [_splat(builder, value, kind) for value in arguments]
         suffix = f"f{number.bitwidth}"
@@ -113,6 +120,7 @@ def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
         return builder.call(fused, splats)
 
     def suited(given: Any) -> Any:
+        """The type of an argument: a vector stays, any number becomes one like `total`'s."""
         return given if isinstance(given, Vector) else number
 
     return total(suited(factor), suited(other), total), build

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
@@ -13,7 +14,7 @@ from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
-from qbumpers.registration import as_numbers
+from qbumpers.registration import as_numbers, files_from, files_in
 from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
@@ -60,11 +61,11 @@ class Condition(NamedTuple):
 
     Attributes:
         task: what is to be learned.
-        values: Q* of the assistant; float64 [S, A] of a task with a table, else a network.
+        values: Q* of the assistant; float64 [S, A] if the task has a table, else a network.
         others: the further rows of values that the assistant's rule named, float64 [S, K, A], or
             networks.
-        discount: of those values.
-        assistant: that helps.
+        discount: gamma of those values, in (0, 1].
+        assistant: what helps in the first `episodes`.
         learner: settings of the simulated learner.
         perception: what it believes happened, or the name of that.
         penalty: of a named perception that includes disruption, in reward units.
@@ -73,6 +74,7 @@ class Condition(NamedTuple):
         episodes: E, assisted episodes of a trial, each followed by a greedy unassisted one.
         retention: R, further episodes in which the learner goes on without the assistant.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+        files: what is in the files that the learner's settings name, float64 [N, K] by name.
     """
 
     task: Task
@@ -88,6 +90,7 @@ class Condition(NamedTuple):
     episodes: int = 100
     retention: int = 0
     common_random_numbers: bool = False
+    files: Mapping[str, np.ndarray] = {}
 
     def __reduce__(self) -> Any:
         """Pickle with the user's own rules and learner, which are registered on unpickling."""
@@ -107,7 +110,7 @@ class Condition(NamedTuple):
         return found._replace(penalty=self.penalty) if found.penalty else found
 
     def model(self) -> Model:
-        """What a rule with memory is told of the task."""
+        """What a rule with memory may know of the task."""
         task = self.task
         dynamics = task.dynamics() if task.states else None
         return Model(
@@ -142,7 +145,7 @@ class Condition(NamedTuple):
             "motor": _plain(self.motor) if self.motor != Motor() else None,
             "forgetting": self.forgetting,
             "others": _digest(self.others) if self.assistant.values else "",
-            "files": _file_digests(self.assistant),
+            "files": [*_file_digests(self.assistant), *map(_digest, self.files.values())],
         }
         return {
             "task": self.task.digest(),
@@ -229,7 +232,7 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
     _check_numbers(condition)
     _check_kept(f"options of assistant {helper.name}", helper.described())
     _check_kept(f"learner {condition.learner_type.name}", _plain(condition.learner))
-    return condition
+    return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
 
 
 def _check_kept(where: str, settings: dict[str, Any]) -> None:
@@ -334,11 +337,12 @@ def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | Non
     motor = None if condition.motor == Motor() else condition.motor
     forgetting = float(condition.forgetting) if condition.forgetting else None
     perception = as_numbers(condition.perceived())
-    return as_numbers(condition.learner), perception, motor, forgetting
+    with files_from(condition.files):
+        return as_numbers(condition.learner), perception, motor, forgetting
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:
-    """Room for the outcomes of so many trials."""
+    """Arrays [T, E] for the outcomes of so many trials, to be filled."""
     kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
     shape = (trials, condition.episodes + condition.retention)
     return Outcomes(*(np.zeros(shape, kind) for kind in kinds))

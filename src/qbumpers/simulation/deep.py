@@ -25,6 +25,11 @@ from qbumpers.simulation.deep_steps import (
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
+REVISION: int = 1
+"""Raised when trials give other numbers by anything that is no rule, learner or task."""
+
+PRECISION: str = "float32"
+
 _ENDED = TERMINATED | TRUNCATED
 
 _SESSION = {f: compiled_for_session(uncompiled(f)) for f in (hold, act, take, preferred)}
@@ -86,7 +91,7 @@ class _Trial:
 
     Args:
         condition: what is simulated.
-        number: of the trial, for messages.
+        number: which trial, for messages.
         each: uint64 [1 or E, 4, 4], streams, of the whole trial or of each episode.
         rows: step records are appended; or None.
         script: played again; or None.
@@ -158,9 +163,9 @@ class _Trial:
         """An episode of training, then a greedy unassisted one.
 
         Args:
-            episode: its number.
-            outcomes: filled.
-            place: of the trial among them.
+            episode: which one of the trial, counted from 0.
+            outcomes: arrays [T, E], of which the elements of this episode are filled.
+            place: row of the trial in them.
         """
         if episode and len(self._each) > 1:
             self._streams[:] = self._each[episode]

@@ -42,12 +42,12 @@ class NetworkAssistance(NamedTuple):
     """The assistant of a learner that observes vectors.
 
     Attributes:
-        layout: of the network of its values.
+        layout: sizes of the network of its values.
         parameters: float32 [1 + K, P], of Q* and of the further rows that its rule named.
-        workspace: float32, of the network.
+        workspace: float32, what the network needs for one observation.
         row: float64 [A], filled with Q*(s, .).
         other_rows: float64 [K, A], filled with the further rows.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
     """
 
     layout: Layout
@@ -62,9 +62,9 @@ class Pieces(NamedTuple):
     """What the steps of a learner have in common.
 
     Attributes:
-        settings: of the learner, as numbers.
-        memory: of the learner, changed in place.
-        rates: of the learner, in this episode.
+        settings: how the learner learns, as numbers; their type selects the learner.
+        memory: what the learner knows, changed in place.
+        rates: the learner's exploration and step size in this episode.
         motor: how the learner's hand errs, a `Motor` as numbers; or None.
         perception: as numbers.
         assistance: its rows are filled by `act`.
@@ -100,9 +100,9 @@ class Chosen(NamedTuple):
         proposed: as in `Step`, like the rest.
         executed: checked by the host.
         undone: whether the state is to be taken back.
-        probability: of an override.
-        coin: of the noise.
-        tie: of the noise.
+        probability: that the rule gave an override, in [0, 1].
+        coin: the noise that decided whether to override.
+        tie: the noise that chose among equally good actions.
     """
 
     proposed: int
@@ -118,8 +118,8 @@ class Outcome(NamedTuple):
 
     Attributes:
         next_observation: float32 [D].
-        reward: of the step.
-        events: bits of `qbumpers.tasks.dynamics`, as the environment told them.
+        reward: what the environment gave.
+        events: bits of `qbumpers.tasks.dynamics`, as the environment gave them.
         happened: the same for the record: of an undone step without its end, of the last step that
             is allowed with `LIMIT`.
     """
@@ -152,7 +152,7 @@ def act(
         common: holds `Pieces`.
         options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
             there. (By itself: compilation leaves out what is not there only for arguments.)
-        rule_memory: of the assistant's rule.
+        rule_memory: what the assistant's rule remembers; 0 if that is nothing.
         observation: float32 [D].
         last: what the learner proposed on the step before; -1 on the first.
         script: proposed action, coin and tie to be played again; or None.
@@ -201,10 +201,10 @@ def take(
     Args:
         common: holds `Pieces`, as `act` left them.
         options: as for `act`.
-        rule_memory: of the assistant's rule.
+        rule_memory: what the assistant's rule remembers; 0 if that is nothing.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
-        outcome: the fields of `Outcome`.
+        outcome: what the environment answered, the fields of `Outcome`.
 
     Returns:
         The action that the learner credits (-1 for none), the projected return of its proposal, the
@@ -252,7 +252,7 @@ def preferred(common: Any, observation: np.ndarray, reward: float, last: int, ov
     Args:
         common: holds `Pieces`.
         observation: float32 [D].
-        reward: that came with it.
+        reward: what came with the observation.
         last: the action before it; -1 at the beginning.
         over: whether the episode has ended; then the action means nothing.
 

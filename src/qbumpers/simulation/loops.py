@@ -45,7 +45,7 @@ class Assistance(NamedTuple):
         values: float64 [S, A], Q* by state.
         others: float64 [S, K, A], the further rows that the rule named.
         seen: int64 [S], what the assistant sees of each state; None if it sees the state.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
         options: of the rule, as numbers; their type selects it.
         width: a tuple of A integers, see `qbumpers.borrowing.row`.
     """
@@ -285,9 +285,9 @@ def run_trials(
     exploration and learning rate that the schedules end with.
 
     Args:
-        model: of the task, with its dynamics.
-        assistance: of the trials.
-        learner: that is simulated.
+        model: what is to be learned, with its dynamics.
+        assistance: what helps in them.
+        learner: what is simulated, with what lies around it.
         streams: uint64 [T, 1, 4, 4] or, to begin anew in every episode, [T, E, 4, 4], see
             `qbumpers.random_streams`.
         retention: R, of the E episodes.

@@ -36,7 +36,7 @@ def simulate(
         task: what is to be learned.
         assistant: an assistant, or the name of one that needs no options.
         trials: how many, at least 1; or which.
-        seed: of the experiment, not negative.
+        seed: decides, with the condition and the number of a trial, all chance; not negative.
         workers: threads, or processes if a task steps in Python; a script that asks for several of
             those must guard its start with `if __name__ == "__main__"`.
         **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
@@ -83,7 +83,15 @@ def _compiling(condition: Condition) -> AbstractContextManager[None]:
 
 
 class Engine(Protocol):
-    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`."""
+    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`.
+
+    Attributes:
+        REVISION: raised when the numbers that it gives change.
+        PRECISION: of those numbers.
+    """
+
+    REVISION: int
+    PRECISION: str
 
     def run_block(self, condition: Condition, trials: range, seed: int) -> Simulation:
         """Simulate trials of a condition, one after another on one core.
@@ -91,7 +99,7 @@ class Engine(Protocol):
         Args:
             condition: what to simulate.
             trials: which trials.
-            seed: of the experiment's random streams.
+            seed: the experiment's, for the random streams.
         """
         ...
 
@@ -107,8 +115,8 @@ class Engine(Protocol):
 
         Args:
             condition: what to simulate.
-            trials: the one trial.
-            seed: of the experiment's random streams.
+            trials: a range of one trial.
+            seed: the experiment's, for the random streams.
             script: proposals and noise to be played again; None to draw them.
             interpreted: whether to run compiled code as plain Python, to be compared with.
         """
@@ -138,7 +146,7 @@ def record(
     Args:
         condition: what to simulate.
         trial: which trial.
-        seed: of the experiment.
+        seed: as for `simulate`.
         script: proposals and noise to be played again, in place of a learner's and fresh noise;
             the trial ends with the script.
 

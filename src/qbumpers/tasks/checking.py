@@ -15,8 +15,8 @@ def check_common(task: Task, make_display: Callable[[Any], Any] | None) -> None:
     """Check what tables and vector tasks have in common.
 
     Args:
-        task: the task.
-        make_display: of the task.
+        task: what is checked.
+        make_display: what the task was given to make its display; None if nothing.
 
     Raises:
         RequestError: if a number is out of range, distances have another shape than [A, A], are not
@@ -50,7 +50,7 @@ def normalised_rows(name: str, probability: np.ndarray) -> np.ndarray:
     """Distributions, checked.
 
     Args:
-        name: of the array, for messages.
+        name: what messages call the array.
         probability: float [..., K].
 
     Returns:

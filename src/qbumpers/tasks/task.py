@@ -47,7 +47,12 @@ class Task(Protocol):
 
     @property
     def observation_space(self) -> gymnasium.Space[Any]:
-        """Discrete(S), or Box of float32 [D]."""
+        """Discrete(S), with the environment's start, or Box of float32 [D]."""
+        ...
+
+    @property
+    def action_space(self) -> gymnasium.spaces.Discrete:
+        """Discrete(A), with the environment's start: elsewhere actions count from 0."""
         ...
 
     @property
@@ -108,6 +113,16 @@ class Task(Protocol):
     @property
     def releases_gil(self) -> bool:
         """Whether simulations of it run in threads at once: none of it is Python."""
+        ...
+
+    @property
+    def code(self) -> tuple[Any, ...]:
+        """What decides its steps beside its digest: functions, classes, modules of libraries."""
+        ...
+
+    @property
+    def revision(self) -> int:
+        """Raised when it gives other numbers for a reason that its code does not show."""
         ...
 
     def digest(self) -> str:

@@ -26,7 +26,7 @@ def learn_values(
     Args:
         task: what is to be learned.
         episodes: how many, at least 1.
-        seed: of the random streams, not negative.
+        seed: decides all chance; not negative.
         learner: schedules and discount; if None, the paper's, with the task's discount.
 
     Returns:

@@ -29,7 +29,7 @@ class Look(NamedTuple):
 
     Attributes:
         colour: as "#rrggbb".
-        marker: of Matplotlib.
+        marker: shape of its points, as Matplotlib names it.
     """
 
     colour: str
@@ -159,8 +159,8 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     """Write a figure as PNG and SVG, atomically.
 
     Args:
-        drawing: the figure.
-        folder: where to.
+        drawing: what is to be saved.
+        folder: where the files go.
         name: without ending.
 
     Returns:

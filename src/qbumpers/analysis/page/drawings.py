@@ -26,8 +26,8 @@ def drawings(results: Results, findings: Findings) -> list[Drawing]:
     """Every figure of a report.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
 
     Returns:
         The figures, learner by learner; those that are added come last.
@@ -134,11 +134,7 @@ def _of_options(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
 ) -> Iterator[Drawing]:
     make = partial(_drawing, about.label)
-    options = {
-        option: None
-        for named in results.experiment.conditions()
-        for option in named.assistant.options._asdict()
-    }
+    options = dict.fromkeys(option for each in results.conditions for option in each.options)
     swept = sensitivity.sensitivities(about.summary, list(options))
     if swept.height:
         yield make(

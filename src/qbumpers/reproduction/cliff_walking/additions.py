@@ -41,8 +41,8 @@ def additions(results: Results, findings: Findings) -> Additions:
     """Comparisons with printed numbers, and why no threshold serves.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
     """
     numbers = printed_numbers("cliff-walking")
     comparisons = compare(numbers, findings.summary, findings.regrets)
@@ -83,7 +83,7 @@ def thresholds_section(table: np.ndarray, summary: ThresholdSummary) -> Section:
 
     Args:
         table: Q* of Cliff Walking, float64 [48, 4].
-        summary: the numbers of Section 4.1.
+        summary: the numbers of Section 4.1, worked out from Q*.
     """
     introduction = Markup(
         "<p>Local Q-Thresholding overrides a move if its value falls short of the best by more "
