@@ -1,6 +1,6 @@
 """What is said of functions that cannot be compiled."""
 
-from qbumpers.registration import shortened
+from qbumpers.compilation import shortened
 
 
 def test_a_message_of_numba_is_one_line_without_colours():

@@ -7,10 +7,12 @@ sources of the whole package. What cannot be kept, or was damaged, is compiled a
 With `NUMBA_DISABLE_JIT=1` nothing is compiled and everything runs as the Python that it is.
 """
 
+import contextlib
 import functools
 import hashlib
+import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,6 +25,7 @@ from numba.core.errors import NumbaError
 from numba.experimental import structref
 from numba.extending import register_jitable
 
+from qbumpers.errors import RequestError
 from qbumpers.kept_code import CodeFiles, KeptCodeWarning, reason
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -93,6 +96,35 @@ def _warn_once(problem: str, detail: str) -> None:
         _warned.add(problem)
         message = f"compiled code {problem} ({detail}); it is compiled anew, which takes seconds"
         warnings.warn(message, KeptCodeWarning, stacklevel=2)
+
+
+class CompilationError(Exception):
+    """A function, or what it is to be called with, is nothing that Numba compiles."""
+
+
+_COLOUR_CODE = re.compile(r"\x1b\[[\d;]*m")
+
+
+def shortened(error: BaseException) -> str:
+    """The beginning of Numba's message in one line, without its colours."""
+    lines = _COLOUR_CODE.sub("", str(error)).splitlines()[:4]
+    return "; ".join(line.strip() for line in lines if line.strip())
+
+
+@contextlib.contextmanager
+def compiling_together(what: str) -> Iterator[None]:
+    """Within the block, an error of compiling says what was compiled.
+
+    Args:
+        what: for the message, for instance "assistant guide, learner q-learning".
+
+    Raises:
+        RequestError: in place of Numba's error.
+    """
+    try:
+        yield
+    except NumbaError as error:
+        raise RequestError(f"{what}: cannot be compiled together: {shortened(error)}") from error
 
 
 def compiles() -> bool:
@@ -172,8 +204,14 @@ def compiled_for_session(function: F) -> F:
 
     Returns:
         The same function, compiled at its first call.
+
+    Raises:
+        CompilationError: if it is no function but something else that can be called.
     """
-    dispatcher: Any = numba.njit(**INLINE)(function)
+    try:
+        dispatcher: Any = numba.njit(**INLINE)(function)
+    except TypeError as error:
+        raise CompilationError(f"{function!r} is not a function") from error
     return dispatcher
 
 
@@ -254,10 +292,6 @@ def compiled_with(function: F, settings: dict[str, Any]) -> F:
     return numba.jit(**settings)(function)  # type: ignore[no-any-return]
 
 
-CompilationError = (NumbaError, TypeError)
-"""What compiling a function raises that Numba cannot compile."""
-
-
 def type_of(value: Any) -> Any:
     """The type that compiled code has for a value."""
     return numba.typeof(value)
@@ -274,9 +308,12 @@ def result_type(function: Any, *types: Any) -> Any:
         The type of what it returns.
 
     Raises:
-        NumbaError: if it cannot be compiled.
+        CompilationError: if it cannot be compiled.
     """
-    function.compile(types)
+    try:
+        function.compile(types)
+    except Exception as error:  # Numba raises much beside its own kind of errors
+        raise CompilationError(str(error)) from error
     # A constant has a type of its own, which is also that of other whole numbers.
     return numba.types.unliteral(function.overloads[types].signature.return_type)
 

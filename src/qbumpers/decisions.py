@@ -70,6 +70,29 @@ class Decision(NamedTuple):
     undo: bool = False
 
 
+def checked_decision(found: Any, assistant: str) -> Decision:
+    """What a rule returned, if it is a decision.
+
+    Args:
+        found: by a rule that runs as plain Python.
+        assistant: its name, for the message.
+
+    Raises:
+        RequestError: if it is something else, or not made of numbers.
+    """
+    numbers, given = (int, float, np.number), found
+    if not (
+        isinstance(found, Decision)
+        and isinstance(given.action, numbers)
+        and isinstance(given.probability, numbers)
+    ):
+        raise RequestError(
+            f"assistant {assistant}: its rule returns {found!r}; a Decision is needed, of an "
+            "action and a probability"
+        )
+    return found
+
+
 class Step(NamedTuple):
     """The record of one assisted step, the same from every host; or, with arrays [N], a table.
 

@@ -94,8 +94,12 @@ def checked(kind: type, fields: Mapping[str, Any], where: str) -> Any:
         RequestError: naming each field that is wrong, its value and what is allowed.
     """
     from pydantic import TypeAdapter, ValidationError
+    from pydantic.errors import PydanticUserError
 
     try:
         return TypeAdapter(kind).validate_python(dict(fields), strict=True)
     except ValidationError as error:
         raise from_validation(error, where) from error
+    except PydanticUserError as error:
+        reason = str(error).partition(". ")[0]
+        raise RequestError(f"{where}: {reason}") from error

@@ -146,6 +146,15 @@ def test_an_archive_with_other_contents_is_refused(tmp_path, content):
         load_values(tmp_path / "other.npz")
 
 
+def test_a_file_of_another_version_that_cannot_be_read_names_it(tmp_path):
+    provenance = {"version": "99.0.0", "colour": "red", "sha256": ""}
+    np.savez(tmp_path / "new.npz", table=TABLE, provenance=np.array(json.dumps(provenance)))
+    with pytest.raises(
+        RequestError, match=rf"by qbumpers 99\.0\.0, .* {qbumpers.__version__} .*col"
+    ):
+        load_values(tmp_path / "new.npz")
+
+
 @pytest.mark.parametrize("field", ["table", "discount"])
 def test_changed_contents_do_not_match_their_hash(saved, field):
     with np.load(saved) as file:

@@ -10,10 +10,10 @@ import numpy as np
 from qbumpers.assistants import dispatch
 from qbumpers.assistants.compiling import BY_POSITION
 from qbumpers.assistants.registry import NEEDS, Rule, compile_rule, registered
-from qbumpers.compilation import CompilationError, uncompiled
-from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+from qbumpers.compilation import CompilationError, shortened, uncompiled
+from qbumpers.decisions import Decision, Model, Noise, Situation, Step, checked_decision
 from qbumpers.errors import RequestError, checked, unknown_name
-from qbumpers.registration import as_numbers, files_in, shortened
+from qbumpers.registration import as_numbers, files_in
 
 _WORDS = {
     "states": "numbered states",
@@ -106,12 +106,14 @@ class Assistant:
         rule = self.rule
         try:
             if rule.start is None:
-                return uncompiled(rule.decide)(situation, noise, self.numbers)
-            return uncompiled(rule.decide)(situation, noise, self.numbers, memory)
+                found = uncompiled(rule.decide)(situation, noise, self.numbers)
+            else:
+                found = uncompiled(rule.decide)(situation, noise, self.numbers, memory)
         except ValueError as error:
             if "too many values to unpack" in str(error):
                 raise RequestError(f"assistant {self.name}: {BY_POSITION}") from error
             raise
+        return checked_decision(found, self.name)
 
     def observe(self, memory: Any, step: Step) -> Any:
         """The rule's memory after a step; unchanged if it is memoryless."""

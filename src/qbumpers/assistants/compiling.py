@@ -30,9 +30,8 @@ def compile_functions(kind: Kind, decide: Any, start: Any, observe: Any, options
         options: an example of its options, as numbers.
 
     Raises:
-        NumbaError: if one of them cannot be compiled for these types.
-        TypeError: if one of them returns something of another type than it should.
-        RequestError: if the rule unpacks the situation by position.
+        CompilationError: if one of them cannot be compiled for these types.
+        RequestError: if the rule unpacks the situation by position, or does not return a Decision.
     """
     state = 0 if kind == "states" else read_only(np.zeros(1, np.float32))
     values, others = read_only((np.zeros(2), np.zeros((0, 2))))
@@ -49,7 +48,9 @@ def compile_functions(kind: Kind, decide: Any, start: Any, observe: Any, options
         )
         observed = result_type(observe, memory, step, options)
         if observed != memory:
-            raise TypeError(f"observe returns {observed}, but start makes a memory of {memory}")
+            raise CompilationError(
+                f"observe returns {observed}, but start makes a memory of {memory}"
+            )
         arguments = (*arguments, memory)
     try:
         decided = result_type(decide, *arguments)
@@ -57,8 +58,13 @@ def compile_functions(kind: Kind, decide: Any, start: Any, observe: Any, options
         if "wrong tuple length" in str(error) and f"got {len(Situation._fields)}" in str(error):
             raise RequestError(BY_POSITION) from error
         raise
-    if getattr(decided, "instance_class", None) is not Decision:
-        raise TypeError(f"it returns {decided}, not a Decision")
+    always, sometimes = (
+        getattr(kind, "instance_class", None) is Decision
+        for kind in (decided, getattr(decided, "type", None))
+    )
+    if not always:
+        error = CompilationError if sometimes else RequestError
+        raise error(f"it returns {decided}, not {'always ' if sometimes else ''}a Decision")
 
 
 def _example_dynamics() -> Dynamics:

@@ -1,16 +1,16 @@
 """Decision rules by name: registering one, and finding it again."""
 
-import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Any
 
 from qbumpers.assistants.compiling import Kind, compile_functions
-from qbumpers.compilation import is_compiled, is_of_package, uncompiled
+from qbumpers.compilation import is_compiled, is_of_package
 from qbumpers.decisions import Decision
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.registration import (
+    check_arguments,
     checked_class,
     compiled_or_plain,
     fresh_class,
@@ -119,12 +119,14 @@ def register_assistant(
 
     Raises:
         RequestError: if `options_type` is no NamedTuple class, only one of `start` and `observe` is
-            given, `start` does not take a model, or a need is unknown.
+            given, a need is unknown, or a function takes other arguments or returns something else.
     """
-    _check(name, options_type, start, observe, needs, values)
+    _check(name, options_type, start, observe, check_start, needs, values)
+    arguments = ("situation", "noise", "options", *(() if start is None else ("memory",)))
 
     def decorate(function: Callable[..., Decision]) -> Callable[..., Decision]:
         """Register the rule, compiled if possible; the function itself stays what it was."""
+        check_arguments(function, arguments, f"rule {name!r}")
         others = (options_type, start, observe, check_start)
         built_in = is_of_package(function) and all(map(is_written_here, others))
         rule = Rule(
@@ -141,14 +143,22 @@ def register_assistant(
 
 
 def _check(
-    name: str, options_type: Any, start: Any, observe: Any, needs: Sequence[str],
-    values: Sequence[str],
+    name: str, options_type: Any, start: Any, observe: Any, check_start: Any,
+    needs: Sequence[str], values: Sequence[str],
 ) -> None:  # fmt: skip
     checked_class(options_type, f"options_type of {name!r}")
+    if "name" in options_type._fields:
+        raise RequestError(f"rule {name!r}: an option cannot be called 'name', as the rule is")
     if (start is None) != (observe is None):
         raise RequestError(f"rule {name!r}: give both start and observe, or neither")
-    if start is not None and len(inspect.signature(uncompiled(start)).parameters) != 2:
-        raise RequestError(f"rule {name!r}: start takes two arguments, (options, model)")
+    functions = {
+        "start": (start, ("options", "model")),
+        "observe": (observe, ("memory", "step", "options")),
+        "check_start": (check_start, ("options", "start_value")),
+    }
+    for which, (function, arguments) in functions.items():
+        if function is not None:
+            check_arguments(function, arguments, f"rule {name!r}: {which}")
     for need in needs:
         if need not in NEEDS:
             raise unknown_name(f"need of rule {name!r}:", need, NEEDS)
@@ -182,7 +192,7 @@ def compile_rule(rule: Rule, kind: Kind) -> None:
     """Compile a rule for tasks with numbered "states" or with "vectors", without calling it.
 
     Raises:
-        NumbaError: if it cannot be compiled for them.
+        CompilationError: if it cannot be compiled for them.
     """
     _compile(rule, kind, rule.decide, rule.start, rule.observe)
 

@@ -4,7 +4,6 @@
 # pyright: basic
 
 import warnings
-import zipfile
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from qbumpers.experts.normalisation import (
     normalisation_of,
     statistics_in_training,
 )
+from qbumpers.experts.unreadable import why_unreadable
 from qbumpers.networks.network import Network
 from qbumpers.tasks.task import Task
 from qbumpers.tasks.wrapping import altering_wrappers
@@ -162,12 +162,8 @@ def _loaded(kind: Any, path: Path) -> Any:
         raise RequestError(f"model {path}: there is no such file")
     try:
         return kind.load(path, device="cpu")
-    except (
-        ValueError, KeyError, TypeError, AttributeError, RuntimeError, AssertionError, EOFError,
-        ImportError, OSError, zipfile.BadZipFile,
-    ) as error:  # fmt: skip
-        reason = str(error).partition("\n")[0]
-        raise RequestError(f"model {path}: not a DQN of Stable-Baselines3 ({reason})") from error
+    except Exception as error:  # reading a pickle can raise anything
+        raise RequestError(f"model {why_unreadable(path, error)}") from error
 
 
 def _check_sizes(where: str, model: Any, task: Task) -> None:

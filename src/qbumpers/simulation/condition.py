@@ -1,6 +1,7 @@
 """What a trial needs, checked before any of it runs."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypedDict, Unpack
 
@@ -229,7 +230,21 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
         setup.get("common_random_numbers", False),
     )
     _check_numbers(condition)
+    _check_kept(f"options of assistant {helper.name}", helper.described())
+    _check_kept(f"learner {condition.learner_type.name}", _plain(condition.learner))
     return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
+
+
+def _check_kept(where: str, settings: dict[str, Any]) -> None:
+    """Check that settings can be written: they name results and seed random streams."""
+    for field, value in settings.items():
+        try:
+            json.dumps(value)
+        except (TypeError, ValueError) as error:
+            raise RequestError(
+                f"{where}: {field} = {value!r}; only numbers, texts, lists and tables of them, and "
+                "Files of numbers, can be kept with results"
+            ) from error
 
 
 def _check_numbers(condition: Condition) -> None:

@@ -1,11 +1,13 @@
 """Simulated learners at any task: `simulate`, and its parts for prepared conditions."""
 
 import itertools
+from contextlib import AbstractContextManager
 from typing import Protocol, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
+from qbumpers.compilation import compiling_together
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.simulation import deep, tabular
@@ -71,7 +73,13 @@ def run(
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    return engine_of(condition.task).run_block(condition, trials, seed)
+    with _compiling(condition):
+        return engine_of(condition.task).run_block(condition, trials, seed)
+
+
+def _compiling(condition: Condition) -> AbstractContextManager[None]:
+    what = f"assistant {condition.assistant.name}, learner {condition.learner_type.name}"
+    return compiling_together(what)
 
 
 class Engine(Protocol):
@@ -151,7 +159,8 @@ def record(
     if script is not None:
         _check_script(script, condition.task.actions)
     trials = _checked_trials(range(trial, trial + 1), seed)
-    return engine_of(condition.task).record(condition, trials, seed, script)
+    with _compiling(condition):
+        return engine_of(condition.task).record(condition, trials, seed, script)
 
 
 def _checked_trials(trials: int | range, seed: int) -> range:

@@ -177,21 +177,35 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
         RequestError: if it is no such file, its arrays do not fit together, or it was changed
             since.
     """
+    version = ""
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             arrays = dict(archive.items())
-        provenance = json.loads(str(arrays.pop("provenance")))
+        provenance = json.loads(str(arrays.pop("provenance", "{}")))
+        version = str(provenance.get("version", ""))
         expected = provenance.pop("sha256")
         values = _with_others(arrays, provenance)
     except RequestError as error:
         raise RequestError(f"values file {path}: {error}") from error
     except _DAMAGE as error:
-        raise RequestError(f"values file {path}: not a file of Q values ({error})") from error
+        raise RequestError(f"values file {path}: {_reason(content, version, error)}") from error
     if values.digest() != expected:
         raise RequestError(
             f"values file {path}: its contents do not match its hash; it was changed"
         )
     return values
+
+
+def _reason(content: bytes, version: str, error: Exception) -> str:
+    """Why a file cannot be read."""
+    if version not in ("", qbumpers.__version__):
+        return f"written by qbumpers {version}, and this is {qbumpers.__version__} ({error})"
+    if b"_stable_baselines3_version" in content:
+        return (
+            "a model of Stable-Baselines3; convert it by qbumpers.experts.from_stable_baselines "
+            "and save the values"
+        )
+    return f"not a file of Q values ({error})"
 
 
 def _with_others(
