@@ -63,7 +63,7 @@ def reproducing_cold() -> Row:
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder)
         cold = reproduction_time(cache)
-        if not any(cache.rglob("*.nbi")):
+        if not any(cache.rglob("*.nbc")):
             raise RuntimeError(f"no compiled code in {cache}: the run was not cold")
         idle = command_time("-c", _LIBRARIES)
     return compared("reproduce, cold", [cold], UNIT, _LIBRARIES, [idle], Target(60))

@@ -73,7 +73,7 @@ def make(data: Path, folder: Path) -> None:
     images = folder / "images"
     images.mkdir(parents=True, exist_ok=True)
     archive = load_archive(data)
-    findings = find_tables(archive.trials, archive.experiment)
+    findings = find_tables(archive.trials, archive.experiment, archive.conditions)
     draw(archive, findings.summary, images)
     runs = compared_runs(archive, data / RUNS)
     if runs is not None:

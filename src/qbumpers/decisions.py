@@ -176,7 +176,7 @@ def begin(values: np.ndarray, episode: int) -> Account:
         values: float64 [A], Q*(s_0, .).
         episode: episodes of this learner or participant before this one.
     """
-    return Account(0.0, 1.0, best_value(values), episode, 0)
+    return Account(0.0, 1.0, float(best_value(values)), episode, 0)
 
 
 @inlined
@@ -265,7 +265,7 @@ def step_of(
         execution.undone, credited, overridden, execution.probability, noise.coin, noise.tie,
         situation.values,
         projected_return(
-            situation.earned, situation.discount, situation.values[situation.proposed]
+            situation.earned, situation.discount, float(situation.values[situation.proposed])
         ),
         reward, next_state, events,
     )  # fmt: skip

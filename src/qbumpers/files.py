@@ -3,6 +3,7 @@
 import contextlib
 import os
 import platform
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -12,10 +13,8 @@ import filelock
 
 from qbumpers.errors import RequestError
 
-LEFT_BEHIND = ".*.part"
-"""Pattern of the temporary files that a killed process leaves."""
-
 _LOCK = ".lock"
+_PART = re.compile(r"\.(?P<name>.+)\.(?P<process>\d+)(?:@(?P<machine>.+))?\.part")
 
 
 class StoreError(OSError):
@@ -32,7 +31,7 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
     Raises:
         StoreError: if it cannot be written, for example on a full disk.
     """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}@{platform.node()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write(temporary)
@@ -44,6 +43,35 @@ def write_atomically(path: Path, write: Callable[[Path], Any]) -> None:
     finally:
         with contextlib.suppress(OSError):  # an unwritable folder: nothing was left there
             temporary.unlink(missing_ok=True)
+
+
+def clear_left(folder: Path, own: Callable[[str], bool]) -> None:
+    """Delete the temporary files that processes left which were killed while they wrote.
+
+    Args:
+        folder: in which they lie; those in folders below are left alone.
+        own: whether a file of this name is one that the caller writes.
+    """
+    for path in folder.iterdir() if folder.is_dir() else ():
+        part = _PART.fullmatch(path.name)
+        if part is None or not own(part["name"]):
+            continue
+        elsewhere = part["machine"] not in (None, platform.node())
+        if not elsewhere and not _is_running(int(part["process"])):
+            path.unlink(missing_ok=True)
+
+
+def _is_running(process: int) -> bool:
+    """Whether there is a process of this number; on Windows nobody can ask without harm."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # it is somebody else's
+        return True
+    return True
 
 
 class Folder(Protocol):
@@ -65,8 +93,12 @@ class Folder(Protocol):
         """Delete a file, if it is there."""
         ...
 
+    def clear_left(self, under: str, own: Callable[[str], bool]) -> None:
+        """Delete what killed processes left half-written in a folder below; see `clear_left`."""
+        ...
+
     def locked(self) -> contextlib.AbstractContextManager[None]:
-        """Keep other writers out, and clear away what a killed one left half-written.
+        """Keep other writers out.
 
         RequestError if the folder is a file or another run is writing to it; StoreError if
         it cannot be written.
@@ -130,6 +162,10 @@ class LocalFolder:
         """See `Folder`."""
         (self._path / name).unlink(missing_ok=True)
 
+    def clear_left(self, under: str, own: Callable[[str], bool]) -> None:
+        """See `Folder`."""
+        clear_left(self._path / under, own)
+
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
         """See `Folder`; the lock of a killed run opens by itself."""
@@ -148,8 +184,6 @@ class LocalFolder:
                 f"cannot write {self._path / _LOCK}: {error.strerror or error}"
             ) from error
         with lock:
-            for left in self._path.rglob(LEFT_BEHIND):
-                left.unlink(missing_ok=True)
             yield
 
 
@@ -204,6 +238,9 @@ class RemoteFolder:
         """See `Folder`."""
         with self._failing(name), contextlib.suppress(FileNotFoundError):
             self._system.rm_file(self._place(name))
+
+    def clear_left(self, under: str, own: Callable[[str], bool]) -> None:
+        """See `Folder`; an object store shows no file before it is whole."""
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:

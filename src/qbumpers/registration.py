@@ -5,23 +5,30 @@ registration has a class of its own. Compiled code knows numbers, tuples and arr
 among the settings reach it as such.
 """
 
+import contextlib
 import itertools
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from qbumpers.compilation import CompilationError, compiled_for_session, is_compiled
+from qbumpers.compilation import CompilationError, compiled_for_session, compiles, is_compiled
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
+_originals: dict[type, type] = {}
 
 _COLOUR_CODE = re.compile(r"\x1b\[[\d;]*m")
 
 _FILE = "a file of numbers"
+
+_nothing: Mapping[str, np.ndarray] = MappingProxyType({})
+_kept: ContextVar[Mapping[str, np.ndarray]] = ContextVar("kept", default=_nothing)
 
 File = Annotated[str, _FILE]
 """A setting that names a file of numbers, `.npy` or `.csv`; functions get a float64 array."""
@@ -55,7 +62,19 @@ def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], 
         return remade, (name, tuple(instance))
 
     members = {"__slots__": (), "__reduce__": reduce}
-    return type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    fresh = type(f"{kind.__name__}_{next(_registrations)}", (kind,), members)
+    _originals[fresh] = kind
+    return fresh
+
+
+def original_class(kind: type) -> type:
+    """The class that a fresh one was made of; any other class itself."""
+    return _originals.get(kind, kind)
+
+
+def is_written_here(part: Any) -> bool:
+    """Whether a function or class is of this package; so is None, which is nobody's."""
+    return part is None or part.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
 def compiled_or_plain(
@@ -72,6 +91,8 @@ def compiled_or_plain(
     Returns:
         The functions, and what they compile for: nothing if they are plain Python.
     """
+    if not compiles():
+        return functions, frozenset()
     session = tuple(
         f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
     )
@@ -142,6 +163,36 @@ def as_numbers(settings: Any) -> Any:
     )
 
 
+@contextlib.contextmanager
+def files_from(kept: Mapping[str, np.ndarray]) -> Iterator[None]:
+    """Within the block, what is in some files is taken from here: they may have changed by now.
+
+    Args:
+        kept: float64 [N, K] by the name of the file, as settings have it.
+    """
+    before = _kept.set(kept)
+    try:
+        yield
+    finally:
+        _kept.reset(before)
+
+
+def files_in(settings: Any, numbers: Any) -> dict[str, np.ndarray]:
+    """What is in the files that settings name, by the names that they have there.
+
+    Args:
+        settings: a NamedTuple, checked.
+        numbers: the same from `as_numbers`.
+    """
+    found: dict[str, np.ndarray] = {}
+    for value, number in zip(settings, numbers, strict=True):
+        if isinstance(number, np.ndarray):
+            found[value] = number
+        elif hasattr(value, "_fields"):
+            found |= files_in(value, number)
+    return found
+
+
 def _number_of(value: Any, hint: Any, field: str) -> Any:
     if hasattr(value, "_fields"):
         return as_numbers(value)
@@ -159,10 +210,15 @@ def _is_file(hint: Any) -> bool:
 
 def _numbers_in(name: str, field: str) -> np.ndarray:
     """Float64 [N, K], the numbers in a file."""
+    if name in _kept.get():
+        return _kept.get()[name]
     try:
-        found = np.load(name) if Path(name).suffix == ".npy" else np.loadtxt(name, delimiter=",")
+        if Path(name).suffix == ".npy":
+            found = np.load(name)
+        else:
+            found = np.loadtxt(name, delimiter=",", encoding="utf-8-sig", ndmin=2)
         numbers = np.ascontiguousarray(np.atleast_2d(found), np.float64)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise RequestError(
             f"{field} = {name!r}: not a .npy or .csv file of numbers ({reason})"

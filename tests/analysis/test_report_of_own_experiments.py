@@ -180,7 +180,7 @@ def test_what_an_earlier_analysis_left_is_removed_and_nothing_else(plain, tmp_pa
     folder = tmp_path / "again"
     shutil.copytree(plain, folder)
     stale = ["regret.csv", "figures/old.png", "figures/old.svg", "figures/old.csv"]
-    own = ["notes.csv", "figures/notes.txt"]
+    own = ["notes.csv", "figures/notes.txt", "figures/mine.png", "figures/mine.svg", ".x.part"]
     for name in (*stale, *own):
         (folder / name).write_text("x", encoding="utf-8")
     before = set(contents_of(folder, "**/*"))

@@ -45,7 +45,7 @@ def test_a_rate_is_told_in_the_unit_that_suits_it(steps, text):
 def test_the_bar_shows_trials_the_rate_and_the_time_left(capsys):
     announced = []
     with TrialProgress("simulating", announced.append) as bar:
-        first = RunProgress(trials=0, of=4, steps=0, expected=7200.0, damaged=[])
+        first = RunProgress(trials=0, of=4, steps=0, expected=7200.0, damaged=[], changed=[])
         bar.show(first)
         bar.show(first._replace(trials=1, steps=500_000))
     assert announced == [first]

@@ -2,9 +2,11 @@
 
 import shutil
 
+import gymnasium
 import pytest
 
 from tests.experiments.examples import run_into
+from tests.experiments.own_files import OwnFiles
 from tests.experiments.with_ray import ALONE
 
 
@@ -27,3 +29,11 @@ def ray_alone():
         for name, value in ALONE.items():
             patch.setenv(name, value)
         yield
+
+
+@pytest.fixture
+def own_files(tmp_path, monkeypatch, own_registry):
+    """Files of a user's own, to be edited and registered."""
+    (tmp_path / "own").mkdir()
+    yield OwnFiles(tmp_path / "own", monkeypatch)
+    gymnasium.registry.pop("own/Walk-v0", None)

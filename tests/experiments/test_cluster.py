@@ -16,6 +16,7 @@ from qbumpers.experiments.cluster import LOCAL, RayCluster, versions
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
+from qbumpers.simulation.cores import usable_cores
 from tests.assistants import own_rules
 from tests.experiments.examples import cart, contents_of, settings
 from tests.experiments.with_ray import MARKS
@@ -108,7 +109,7 @@ def test_a_run_through_an_own_ray_equals_a_local_one_though_a_worker_is_killed(
     monkeypatch.setattr(cluster, "_finish_batch", recorded(str(log), kill_once))
     reports = []
     with RayCluster(LOCAL) as ray_cluster:
-        assert ray_cluster.cores == os.cpu_count()
+        assert ray_cluster.cores == usable_cores()
         run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=reports.append)
         with pytest.raises(RequestError, match=r"'local': this process uses Ray already"):
             RayCluster(LOCAL).__enter__()

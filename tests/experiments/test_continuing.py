@@ -11,6 +11,7 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells, work
+from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import load, open_store
 from qbumpers.files import LocalFolder, StoreError
 from tests.experiments.examples import BUMPERS, cells_of, contents_of, rows_of, run_into
@@ -56,7 +57,7 @@ def test_a_folder_may_have_any_name(tmp_path, whole, simulated):
 def test_a_finished_run_reports_all_its_trials_at_once(folder):
     reports = []
     run_into(folder, report=reports.append)
-    assert reports == [(15, 15, 0, 0.0, [])]
+    assert reports == [(15, 15, 0, 0.0, [], [])]
 
 
 def test_only_new_conditions_are_simulated(folder, simulated):
@@ -145,6 +146,12 @@ def test_a_missing_or_damaged_table_is_put_together_again(folder, whole, simulat
     assert contents_of(folder, *TABLES) == contents_of(whole, *TABLES)
 
 
+def opened(folder):
+    """The folder as another run of its experiment has it open."""
+    plan = make_plan(load(folder).experiment)
+    return open_store(folder, plan.experiment, plan.record)
+
+
 DIFFERENT = {
     "seed": (9, "3", "9"),
     "episodes": (6, "4", "6"),
@@ -178,7 +185,7 @@ def test_all_differing_fields_are_named(folder):
 def test_a_folder_that_another_run_is_writing_to_is_refused(folder, simulated):
     before = contents_of(folder, "*.*", "cells/**/*.*")
     message = rf"output folder {folder}: another run is writing to it; wait for it, or choose"
-    with open_store(folder, load(folder).experiment), pytest.raises(RequestError, match=message):
+    with opened(folder), pytest.raises(RequestError, match=message):
         run_into(folder)
     assert simulated == []
     assert contents_of(folder, "*.*", "cells/**/*.*") == before
@@ -187,7 +194,7 @@ def test_a_folder_that_another_run_is_writing_to_is_refused(folder, simulated):
 
 def test_a_run_that_is_refused_does_not_change_the_design_of_the_one_that_writes(folder):
     before = (folder / "experiment.toml").read_bytes()
-    with open_store(folder, load(folder).experiment), pytest.raises(RequestError, match="another"):
+    with opened(folder), pytest.raises(RequestError, match="another"):
         run_into(folder, trials=8)
     assert (folder / "experiment.toml").read_bytes() == before
 
@@ -268,8 +275,8 @@ def test_a_disk_that_fills_up_at_any_write_leaves_only_whole_files(tmp_path, who
     written = []
     monkeypatch.setattr(os, "fsync", written.append)
     run_into(tmp_path / "counting")
-    # The design, the values, two files for each of three cells, two tables.
-    assert len(written) == 1 + 1 + 3 * 2 + 2
+    # The conditions, the design, the values, two files for each of three cells, two tables.
+    assert len(written) == 1 + 1 + 1 + 3 * 2 + 2
     reference = contents_of(whole, "*.*", "cells/**/*.*")
     for place in range(len(written)):
         folder = tmp_path / f"full at {place}"

@@ -27,8 +27,8 @@ def spare(whole, tmp_path_factory):
 
 def surveyed(folder):
     """How many cells are whole, and which files are damaged."""
-    with open_store(folder, PLAN.experiment) as store:
-        found = store.survey(PLAN.conditions)
+    with open_store(folder, PLAN.experiment, PLAN.record) as store:
+        found = store.survey(PLAN.experiment.trials)
     return sum(map(len, found.cells.values())), found.damaged
 
 
@@ -91,7 +91,7 @@ def test_files_of_others_among_the_cells_are_left_alone(folder, whole):
     reports = []
     run_into(folder, report=reports.append)
     assert [path.read_text() for path in others] == ["mine"] * 3
-    assert reports == [(15, 15, 0, 0.0, [])]
+    assert reports == [(15, 15, 0, 0.0, [], [])]
     assert contents_of(folder, "*.parquet") == contents_of(whole, "*.parquet")
 
 
@@ -99,12 +99,11 @@ def test_a_cell_that_is_spoiled_while_the_run_goes_on_ends_it(folder):
     """Whatever was surveyed, nothing unread goes into the tables."""
     before = contents_of(folder, "*.parquet")
     path = cells_of(folder)[3]
-    with open_store(folder, PLAN.experiment) as store:
-        found = store.survey(PLAN.conditions)
+    with open_store(folder, PLAN.experiment, PLAN.record) as store:
+        found = store.survey(PLAN.experiment.trials)
         path.write_bytes(flipped(path.read_bytes(), 40, 0))
-        parts = [(named, found.cells[content]) for named, content in PLAN.named]
         with pytest.raises(StoreError, match=rf"{path.name} was changed .*run it again to mend"):
-            store.assemble(parts)
+            store.assemble(found.cells)
     assert contents_of(folder, "*.parquet") == before
 
 
@@ -119,22 +118,22 @@ def test_cells_of_another_condition_are_not_taken_for_those_of_this_one(folder, 
 
 
 @pytest.mark.parametrize(
-    ("number", "age"), [("1", "an older"), ("3", "a newer"), (None, "an older")]
+    ("number", "age"), [("1", "an older"), ("4", "a newer"), (None, "an older")]
 )
 @pytest.mark.parametrize("use", [run_into, load], ids=["run", "load"])
 def test_a_folder_of_another_version_is_refused_and_left_alone(folder, number, age, use):
     path = folder / "experiment.toml"
     line = "" if number is None else f"format = {number}\n"
-    path.write_text(path.read_text().replace("format = 2\n", line))
+    path.write_text(path.read_text().replace("format = 3\n", line))
     before = contents_of(folder, "*.*", "cells/**/*.*")
-    message = rf"output folder .*written by {age} version .*\(format {number or 1}, needed 2\)"
+    message = rf"output folder .*written by {age} version .*\(format {number or 1}, needed 3\)"
     with pytest.raises(RequestError, match=message):
         use(folder)
     assert contents_of(folder, "*.*", "cells/**/*.*") == before
 
 
 def test_the_format_is_written_down(whole):
-    assert run_description(whole)["format"] == 2
+    assert run_description(whole)["format"] == 3
 
 
 def trials_simulated(monkeypatch):

@@ -66,7 +66,7 @@ def test_every_trial_is_a_cell_of_one_table(whole):
     _, folder, reports = whole
     names = [path.name for path in cells_of(folder)]
     assert len(names) == 4
-    assert {name.rsplit("-", 1)[0] for name in names} == {
+    assert {name.rsplit("-", 2)[0] for name in names} == {
         "000000-1-episodes",
         "000001-1-episodes",
     }

@@ -1,5 +1,7 @@
 """Real runs that are killed, stopped or run out of space go on and end in the same bytes."""
 
+import os
+import platform
 import signal
 import time
 from collections import Counter
@@ -194,10 +196,42 @@ def test_runs_that_start_together_do_not_spoil_each_other(path, tmp_path, uninte
 
 def test_what_a_killed_write_left_behind_is_cleared_away(tmp_path):
     folder = run_into(tmp_path / "run")
-    left = cells_of(folder)[0].with_name(".000000-5-episodes.parquet.4194305.part")
-    left.write_bytes(b"half of it")  # by a process whose number no process can have
+    run_into(folder, trials=8)
+    left = [
+        cells_of(folder)[0].with_name(f".{cells_of(folder)[0].name}.4194305.part"),
+        *(folder / f".{name}.4194305@{platform.node()}.part" for name in OWN_FILES),
+    ]
+    for path in left:  # by a process whose number no process can have
+        path.write_bytes(b"half of it")
     run_into(folder)
-    assert not left.exists()
+    assert [path for path in left if path.exists()] == []
+
+
+OWN_FILES = ("experiment.toml", "conditions.json", "episodes.parquet", "states.parquet")
+
+
+def test_nothing_of_others_is_cleared_away(tmp_path):
+    """Neither a user's own files, nor those of another run below, a live process or a machine."""
+    folder = run_into(tmp_path / "run")
+    nested = run_into(folder / "nested")
+    cell, other = cells_of(folder)[0], cells_of(nested)[0]
+    alive, here = os.getppid(), platform.node()
+    kept = [
+        folder / ".x.part",
+        folder / ".notes.txt.4194305.part",
+        folder / "mine" / ".episodes.parquet.4194305.part",
+        folder / f".episodes.parquet.{alive}@{here}.part",
+        folder / f".episodes.parquet.4194305@not-{here}.part",
+        cell.with_name(".x.4194305.part"),
+        cell.with_name(f".{cell.name}.{alive}.part"),
+        nested / ".experiment.toml.4194305.part",
+        other.with_name(f".{other.name}.4194305.part"),
+    ]
+    for path in kept:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"mine")
+    run_into(folder)
+    assert [path for path in kept if not path.exists()] == []
 
 
 def test_a_full_disk_ends_a_run_with_one_message_and_the_next_goes_on(tmp_path):

@@ -1,6 +1,5 @@
 """What a run writes, and that its numbers depend on nothing but the experiment."""
 
-import os
 import platform
 import tomllib
 from importlib.metadata import version
@@ -16,6 +15,7 @@ from qbumpers.experiments import cells
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.simulation import simulate
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import load_values, solve
 from tests.experiments.examples import (
@@ -53,6 +53,7 @@ def test_a_run_writes_its_design_cells_tables_and_values(folder):
     names = {path.name for path in folder.iterdir()}
     assert names - {".lock"} == {
         "experiment.toml",
+        "conditions.json",
         "cells",
         "episodes.parquet",
         "states.parquet",
@@ -68,7 +69,7 @@ def test_the_design_as_run_can_be_run_again_and_says_where_it_ran(folder):
     assert written["learners"][0]["epsilon"] == {"start": 1.0, "end": 0.02, "fraction": 0.9}
     libraries = ("numpy", "numba", "scipy", "polars")
     assert written["run"] == {
-        "format": 2,
+        "format": 3,
         **{name: version(name) for name in libraries},
         "version": qbumpers.__version__,
         "python": platform.python_version(),
@@ -271,7 +272,7 @@ def test_fewer_than_one_worker_is_refused(tmp_path, workers):
 
 
 def test_all_cores_are_used_unless_fewer_are_asked_for():
-    assert ThisMachine().cores == os.cpu_count()
+    assert ThisMachine().cores == usable_cores()
     assert ThisMachine(3).cores == 3
 
 

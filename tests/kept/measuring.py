@@ -1,7 +1,8 @@
 """Digests of what simulations give, to hold later versions to the same numbers.
 
-`python -m tests.kept.measuring` prints them as JSON; only a change that is meant to change numbers
-may write `numbers.json` anew.
+`python -m tests.kept.measuring` writes `numbers.json` anew, if a change is meant to change numbers:
+then the revision of the rule, learner, task or engine that it changes must be raised, or finished
+trials of the old numbers would be used again beside new ones. It refuses otherwise.
 """
 
 import hashlib
@@ -18,7 +19,7 @@ import polars as pl
 
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.local import ThisMachine
-from qbumpers.experiments.plan import make_plan
+from qbumpers.experiments.plan import Plan, make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.store import load
@@ -51,20 +52,46 @@ def experiments() -> dict[str, Experiment]:
 
 
 def run_numbers(experiment: Experiment) -> dict[str, Any]:
-    """A digest and two means of each condition."""
+    """A digest and two means of each condition, and the revisions of what made them."""
+    plan = make_plan(experiment)
+    revisions = revisions_of(plan)
     with tempfile.TemporaryDirectory() as folder:
-        run_experiment(make_plan(experiment), Path(folder) / "out", backend=ThisMachine(2))
+        run_experiment(plan, Path(folder) / "out", backend=ThisMachine(2))
         episodes = load(Path(folder) / "out").episodes
     return {
         condition: {
             "digest": _digest(rows.get_column(column) for column in _COLUMNS),
             "assisted": float(_mean(rows, "assisted_return")),
             "unassisted": float(_mean(rows, "unassisted_return")),
+            "revisions": revisions[condition],
         }
         for (condition,), rows in episodes.sort("trial", "episode").group_by(
             ["condition"], maintain_order=True
         )
     }
+
+
+def revisions_of(plan: Plan) -> dict[str, dict[str, int]]:
+    """Revisions of what makes the numbers of each condition."""
+    identities = plan.record.identities
+    return {
+        each.condition: dict(identities[each.identity]["revisions"])
+        for each in plan.record.conditions
+    }
+
+
+def unmarked_changes(before: dict[str, Any], now: dict[str, Any]) -> list[str]:
+    """Conditions whose numbers changed although no revision of what makes them was raised."""
+    found = []
+    for name, parts in now.items():
+        for condition, numbers in parts.get("episodes", {}).items():
+            then = before.get(name, {}).get("episodes", {}).get(condition)
+            if then is None or then["revisions"] != numbers["revisions"]:
+                continue
+            steps = [each[name].get("steps", {}).get(condition) for each in (before, now)]
+            if then != numbers or steps[0] != steps[1]:
+                found.append(f"{name}: {condition}")
+    return found
 
 
 def recorded_numbers(experiment: Experiment) -> dict[str, Any]:
@@ -99,7 +126,7 @@ def _digest(columns: Iterator[Any]) -> str:
 
 
 def main() -> None:
-    """Print every kept number as JSON."""
+    """Write every kept number as JSON, if revisions tell which have changed."""
     found: dict[str, Any] = {}
     for name, experiment in experiments().items():
         found[name] = {"episodes": run_numbers(experiment)}
@@ -107,7 +134,10 @@ def main() -> None:
             found[name]["steps"] = recorded_numbers(experiment)
         print(name, file=sys.stderr)
     found["tune"] = tuned_numbers()
-    print(json.dumps(found, indent=1))
+    changed = unmarked_changes(json.loads(NUMBERS.read_text(encoding="utf-8")), found)
+    if changed:
+        sys.exit("numbers changed and no revision was raised:\n" + "\n".join(changed))
+    NUMBERS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

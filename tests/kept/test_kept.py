@@ -1,5 +1,6 @@
 """Numbers that stay: what simulations gave before a change, to the bit, and folders from before."""
 
+import copy
 import json
 import shutil
 
@@ -19,8 +20,10 @@ from tests.kept.measuring import (
     NUMBERS,
     experiments,
     recorded_numbers,
+    revisions_of,
     run_numbers,
     tuned_numbers,
+    unmarked_changes,
 )
 
 KEPT = json.loads(NUMBERS.read_text(encoding="utf-8"))
@@ -42,6 +45,25 @@ def test_the_numbers_of_an_experiment_stay(name):
     assert run_numbers(experiment) == KEPT[name]["episodes"]
     if "steps" in KEPT[name]:
         assert recorded_numbers(experiment) == KEPT[name]["steps"]
+
+
+def test_revisions_are_those_with_which_numbers_were_kept():
+    """A raised revision needs `python -m tests.kept.measuring`, which takes minutes."""
+    for name, experiment in experiments().items():
+        kept = {c: numbers["revisions"] for c, numbers in KEPT[name]["episodes"].items()}
+        assert revisions_of(make_plan(experiment)) == kept, name
+
+
+@pytest.mark.parametrize("part", ["episodes", "steps"])
+def test_numbers_are_not_kept_anew_without_a_raised_revision(part):
+    now = copy.deepcopy(KEPT)
+    assert unmarked_changes(KEPT, now) == []
+    found = now["taxi"][part]
+    changed = found["none"]
+    found["none"] = {**changed, "digest": "0"} if part == "episodes" else "0"
+    assert unmarked_changes(KEPT, now) == ["taxi: none"]
+    now["taxi"]["episodes"]["none"]["revisions"]["engine"] += 1
+    assert unmarked_changes(KEPT, now) == []
 
 
 def test_what_tune_chooses_stays():

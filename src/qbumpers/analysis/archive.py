@@ -10,8 +10,14 @@ from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.measures import MEASURES, trial_measures
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.sources import load_experiment
-from qbumpers.experiments.store import EXPERIMENT, load, run_description
+from qbumpers.experiments.record import CONDITIONS, Record, RecordedCondition
+from qbumpers.experiments.store import (
+    EXPERIMENT,
+    conditions_of,
+    load,
+    load_design,
+    run_description,
+)
 from qbumpers.files import write_atomically
 
 TRIALS, CURVES, OVERRIDES, RUNS = "trials.csv", "curves.csv", "overrides.csv", "runs.csv"
@@ -30,6 +36,7 @@ class Archive(NamedTuple):
         trials: a row per trial, as from `trial_measures`.
         curves: learning curves, returns and success rates, as from `learning_curves`.
         overrides: as from `override_courses`.
+        conditions: what is noted of each.
     """
 
     experiment: Experiment
@@ -37,6 +44,7 @@ class Archive(NamedTuple):
     trials: pl.DataFrame
     curves: pl.DataFrame
     overrides: pl.DataFrame
+    conditions: Sequence[RecordedCondition]
 
 
 Choose = Callable[[pl.DataFrame], Sequence[str]]
@@ -68,7 +76,9 @@ def archive_run(folder: str | Path, into: str | Path, choose: Choose) -> None:
     write_rounded(Path(into) / CURVES, curves)
     write_rounded(Path(into) / OVERRIDES, overrides)
     settings = (Path(folder) / EXPERIMENT).read_bytes()
-    write_atomically(Path(into) / EXPERIMENT, lambda path: path.write_bytes(settings))
+    noted = Record(results.conditions).encoded()
+    for name, content in ((EXPERIMENT, settings), (CONDITIONS, noted)):
+        write_atomically(Path(into) / name, lambda path, content=content: path.write_bytes(content))
 
 
 def load_archive(folder: str | Path) -> Archive:
@@ -81,12 +91,14 @@ def load_archive(folder: str | Path) -> Archive:
         RequestError: if a file is missing.
     """
     place = Path(folder)
+    experiment, trials = load_design(place), read_trials(place / TRIALS)
     return Archive(
-        experiment=load_experiment(place / EXPERIMENT),
+        experiment=experiment,
         run=run_description(place),
-        trials=read_trials(place / TRIALS),
+        trials=trials,
         curves=_read(place / CURVES),
         overrides=_read(place / OVERRIDES),
+        conditions=conditions_of(place, experiment, trials),
     )
 
 

@@ -1,7 +1,7 @@
 """Every table of a report, from the trials of a run."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
@@ -10,9 +10,8 @@ from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.comparisons import RETURNS, against, compare_methods, optimal, pooled
 from qbumpers.analysis.frontier import Regret, matched_regret
 from qbumpers.analysis.measures import summary, trial_samples
-from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.learner_designs import written
+from qbumpers.experiments.record import RecordedCondition
 
 
 class LearnerFindings(NamedTuple):
@@ -80,30 +79,26 @@ class Findings(NamedTuple):
         return self.learners[0].compared if self.regrets else None
 
 
-def find_tables(trials: pl.DataFrame, experiment: Experiment) -> Findings:
+def find_tables(
+    trials: pl.DataFrame, experiment: Experiment, conditions: Sequence[RecordedCondition]
+) -> Findings:
     """Every table of a report.
 
     Args:
         trials: from `trial_measures`.
         experiment: as run.
+        conditions: what is noted of each.
 
     Returns:
         The tables, without additions and sentences.
     """
-    options = {n.condition: _as_cells(n.assistant) for n in experiment.conditions()}
+    options = {each.condition: each.options for each in conditions}
     table = summary(trials, options, experiment.episodes, experiment.retention)
     learners = [
         _about(index, part, trials.filter(learner=part["learner"][0]), experiment)
         for index, part in enumerate(table.partition_by("learner", maintain_order=True))
     ]
     return Findings(table, trials, learners)
-
-
-def _as_cells(assistant: Assistant) -> dict[str, Any]:
-    """Options as a table can hold them: tuples and other assistants as ids write them."""
-    plain = (bool, int, float, str)
-    fields = assistant.options._asdict()
-    return {f: v if isinstance(v, plain) else written(v) for f, v in fields.items()}
 
 
 def _about(

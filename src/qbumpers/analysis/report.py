@@ -1,7 +1,7 @@
 """Tables, figures and one self-contained page, from the files of a finished run alone."""
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from qbumpers.analysis.page.elements import Drawing
 from qbumpers.analysis.page.headlines import cautions, headlines
 from qbumpers.analysis.page.layout import Picture, page
 from qbumpers.experiments.store import Results, load
-from qbumpers.files import write_atomically
+from qbumpers.files import clear_left, write_atomically
 
 REPORT, SUMMARY, TRIALS = "report.html", "summary.csv", "trials.parquet"
 """The page; a row per condition; a row per trial."""
@@ -32,7 +32,7 @@ METHODS, ADVANTAGES, DIFFERENCES, REGRET = (
 
 FIGURES = "figures"
 _OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET)
-_FIGURE_FILES = {".png", ".svg", ".csv"}
+_FIGURE_FILES = (".png", ".svg", ".csv")
 
 
 Add = Callable[[Results, Findings], Additions]
@@ -81,7 +81,8 @@ def write_report(
     advance(REPORT)
     text = page(folder, results, findings, pictures, tables)
     _write(folder / REPORT, text.encode())
-    _clear(folder, {*tables}, {picture.name for picture in pictures})
+    _clear(folder, {*tables})
+    _clear_figures(folder / FIGURES, {picture.name for picture in pictures})
     return findings
 
 
@@ -93,7 +94,7 @@ def find(results: Results, add: Add = nothing) -> Findings:
         add: finds what is to be added.
     """
     trials = trial_measures(results.episodes, results.experiment.criterion)
-    found = find_tables(trials, results.experiment)
+    found = find_tables(trials, results.experiment, results.conditions)
     found = found._replace(additions=add(results, found))
     return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
 
@@ -151,13 +152,26 @@ def _write(path: Path, content: bytes) -> None:
     write_atomically(path, lambda temporary: temporary.write_bytes(content))
 
 
-def _clear(folder: Path, tables: set[str], figures: set[str]) -> None:
-    """Remove what an earlier analysis wrote, and this one did not."""
-    stale = [folder / name for name in _OPTIONAL if name not in tables]
-    stale += [
-        path
-        for path in (folder / FIGURES).iterdir()
-        if path.suffix in _FIGURE_FILES and path.stem not in figures
-    ]
-    for path in stale:
-        path.unlink(missing_ok=True)
+def _clear(folder: Path, tables: set[str]) -> None:
+    """Remove what an earlier analysis wrote, and this one did not, or was killed while it wrote."""
+    for name in _OPTIONAL:
+        if name not in tables:
+            (folder / name).unlink(missing_ok=True)
+    clear_left(folder, {REPORT, SUMMARY, TRIALS, *_OPTIONAL}.__contains__)
+
+
+def _clear_figures(folder: Path, kept: Collection[str]) -> None:
+    """Remove figures that an earlier analysis drew, and files of them that are half-written.
+
+    A figure of a report is three files; others that somebody put there are left alone.
+
+    Args:
+        folder: of the figures.
+        kept: names of the figures that stay, without ending.
+    """
+    for path in folder.glob("*.svg"):
+        files = [path.with_name(path.stem + ending) for ending in _FIGURE_FILES]
+        if path.stem not in kept and all(file.is_file() for file in files):
+            for file in files:
+                file.unlink(missing_ok=True)
+    clear_left(folder, lambda name: name.endswith(_FIGURE_FILES))

@@ -5,13 +5,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, get_type_hints
 
+import numpy as np
+
 from qbumpers.assistants import dispatch
 from qbumpers.assistants.compiling import BY_POSITION
 from qbumpers.assistants.registry import NEEDS, Rule, compile_rule, registered
 from qbumpers.compilation import CompilationError, uncompiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step
 from qbumpers.errors import RequestError, checked, unknown_name
-from qbumpers.registration import as_numbers, shortened
+from qbumpers.registration import as_numbers, files_in, shortened
 
 _WORDS = {
     "states": "numbered states",
@@ -61,6 +63,12 @@ class Assistant:
         """The options as rules take them: texts and files as numbers, `of` as options."""
         own = self.options._replace(of=self.of.numbers) if self.of else self.options
         return as_numbers(own)
+
+    @property
+    def files(self) -> dict[str, np.ndarray]:
+        """What is in the files that its options and those of `of` name, float64 [N, K] by name."""
+        own = self.options._replace(of=self.of.options) if self.of else self.options
+        return files_in(own, self.numbers)
 
     @property
     def needs(self) -> frozenset[str]:

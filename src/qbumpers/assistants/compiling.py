@@ -24,7 +24,7 @@ def compile_functions(kind: Kind, decide: Any, start: Any, observe: Any, options
 
     Args:
         kind: what its tasks have, numbered "states" or "vectors".
-        decide: the rule.
+        decide: the rule itself, a function that Numba is to compile.
         start: makes its memory; None if it has none.
         observe: changes its memory; None if it has none.
         options: an example of its options, as numbers.

@@ -7,10 +7,17 @@ from functools import partial
 from typing import Annotated, Any
 
 from qbumpers.assistants.compiling import Kind, compile_functions
-from qbumpers.compilation import is_of_package, uncompiled
+from qbumpers.compilation import is_compiled, is_of_package, uncompiled
 from qbumpers.decisions import Decision
 from qbumpers.errors import RequestError, unknown_name
-from qbumpers.registration import checked_class, compiled_or_plain, fresh_class, sample
+from qbumpers.registration import (
+    checked_class,
+    compiled_or_plain,
+    fresh_class,
+    is_written_here,
+    original_class,
+    sample,
+)
 
 NEEDS = ("states", "dynamics", "distance", "undo", "no_op")
 """What a rule may need of a task: numbered states, transitions, a distance between actions, a state
@@ -38,6 +45,7 @@ class Rule:
         compiles_for: "states" or "vectors" if Numba compiled it for such tasks; empty if it runs as
             plain Python.
         built_in: whether it belongs to this package, whose compiled code is kept on disk.
+        revision: raised when the numbers that it gives change although its code does not show it.
     """
 
     name: str
@@ -50,6 +58,13 @@ class Rule:
     values: tuple[str, ...]
     compiles_for: frozenset[str]
     built_in: bool
+    revision: int = 1
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """What it was registered with: its functions, None for those it lacks, and its options."""
+        functions = (self.decide, self.start, self.observe, self.check_start)
+        return (*functions, original_class(self.options_type))
 
     @property
     def compiled(self) -> bool:
@@ -75,6 +90,7 @@ def register_assistant(
     check_start: Callable[[Any, float], None] | None = None,
     needs: Sequence[str] = (),
     values: Sequence[str] = (),
+    revision: int = 1,
 ) -> Callable[[Callable[..., Decision]], Callable[..., Decision]]:
     """Register a decision rule under a name; it then works in every host.
 
@@ -93,6 +109,9 @@ def register_assistant(
         needs: of `NEEDS`, what the rule cannot do without; a task that cannot give it is refused.
         values: names of further rows of values that the assistant's values must hold beside Q*, in
             the order in which the rule finds them in `Situation.others`.
+        revision: to be raised when the rule gives other numbers for a reason that its code does not
+            show, for instance a file that it opens by itself; finished trials are then simulated
+            again.
 
     Returns:
         A decorator for the rule, `(situation, noise, options) -> Decision`. The rule is compiled
@@ -106,10 +125,11 @@ def register_assistant(
 
     def decorate(function: Callable[..., Decision]) -> Callable[..., Decision]:
         """Register the rule, compiled if possible; the function itself stays what it was."""
-        built_in = is_of_package(function)
+        others = (options_type, start, observe, check_start)
+        built_in = is_of_package(function) and all(map(is_written_here, others))
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),
-            frozenset({"states", "vectors"}), built_in,
+            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in, revision,
         )  # fmt: skip
         if not built_in:
             rule = _of_user(rule)

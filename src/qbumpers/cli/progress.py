@@ -59,6 +59,8 @@ class TrialProgress:
             self._waiting.stop()
             for name in done.damaged:
                 ERRORS.print(f"damaged, to be made again: {escape(name)}", soft_wrap=True)
+            for reason in done.changed:
+                ERRORS.print(f"changed: {escape(reason)}", soft_wrap=True)
             self._announce(done)
             self._bar.start()
             expected = getattr(done, "expected", None)  # a race cannot tell

@@ -5,6 +5,7 @@ import hashlib
 import importlib.metadata
 import os
 import pickle
+import platform
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.simulation import Condition
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.packing import packed
 
 BATCH_SECONDS = 2.0
@@ -81,7 +83,9 @@ class RayCluster:
         return self
 
     def _connect(self) -> None:
-        settings = {**_QUIET, "include_dashboard": False} if self.address == LOCAL else _QUIET
+        settings: dict[str, Any] = dict(_QUIET)
+        if self.address == LOCAL:
+            settings |= {"include_dashboard": False, "num_cpus": usable_cores()}
         try:
             self._ray.init(self.address, **settings)
         except Exception as error:
@@ -156,12 +160,13 @@ def batches(seconds: dict[Cell, float], cores: int) -> Iterator[list[Cell]]:
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """What decides the bytes of a cell, but for the experiment: code, by its name."""
+    """What decides the bytes of a cell, but for the experiment: code and processor, by name."""
     sources = source_stamp().encode() + Path(work.__file__).read_bytes()
     return {
         "qbumpers": qbumpers.__version__,
         "sources of qbumpers": hashlib.sha256(sources).hexdigest()[:12],
         **{name: importlib.metadata.version(name) for name in ("numba", "numpy", "polars")},
+        "processor": platform.machine(),
     }
 
 

@@ -10,13 +10,20 @@ from pydantic import (
     Field,
     SerializeAsAny,
     ValidationError,
+    ValidationInfo,
     model_validator,
 )
 
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.cells import MANY_CELLS, trials_a_cell
-from qbumpers.experiments.learner_designs import LearnerDesign, apart, by_name, written
+from qbumpers.experiments.learner_designs import (
+    RECORDED,
+    LearnerDesign,
+    apart,
+    by_name,
+    written,
+)
 from qbumpers.experiments.models import Model
 from qbumpers.experiments.sweeps import combinations, options_listed, swept, tables_listed
 from qbumpers.learners import learners
@@ -127,9 +134,9 @@ class Experiment(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _spelt_out(cls, settings: Any) -> Any:
-        """What is left out or written shortly, in full."""
-        if not isinstance(settings, dict):
+    def _spelt_out(cls, settings: Any, info: ValidationInfo) -> Any:
+        """What is left out or written shortly, in full; so are the settings of a finished run."""
+        if not isinstance(settings, dict) or info.context == RECORDED:
             return settings
         settings = {"learners": [{}], **settings}
         if isinstance(settings.get("task"), str):
@@ -142,8 +149,8 @@ class Experiment(Model):
         return settings
 
     @model_validator(mode="after")
-    def _known_names(self) -> "Experiment":
-        for learner in self.learners:
+    def _known_names(self, info: ValidationInfo) -> "Experiment":
+        for learner in [] if info.context == RECORDED else self.learners:
             if learner.observes != self.learners[0].observes:
                 raise RequestError(
                     f"learners.name = {learner.name!r}; it observes {learner.observes}, and "

@@ -4,12 +4,22 @@ import functools
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, create_model
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+)
 
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.models import Model, model_fields_of, model_of, settings_of
 from qbumpers.learners import PERCEPTIONS, Motor, Perception, learner_type, learners
+
+RECORDED = "recorded"
+"""Context in which settings are read that ran before: what they name need not be there any more."""
 
 _PerceptionDesign: Any = model_of(Perception)
 _MotorDesign: Any = model_of(Motor)
@@ -108,10 +118,26 @@ def design_class(name: str) -> type[LearnerDesign]:
     return _design_of(learner_type(name).settings_type, name)
 
 
-def by_name(settings: Any) -> Any:
+class RecordedLearner(LearnerDesign):
+    """A learner of a run whose kind is not registered here, or has other settings by now."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+
+    @property
+    def observes(self) -> str:
+        """Nothing that is known here."""
+        return ""
+
+
+def by_name(settings: Any, info: ValidationInfo) -> Any:
     """A learner by its name, so that messages are about fields of its own kind alone."""
     if isinstance(settings, LearnerDesign):
         return settings
+    if info.context == RECORDED and isinstance(settings, dict):
+        try:
+            return design_class(settings["name"]).model_validate(settings)
+        except (KeyError, RequestError, ValidationError):
+            return RecordedLearner.model_validate(settings)
     if not isinstance(settings, dict):
         return LearnerDesign.model_validate(settings)
     return design_class(settings.get("name", "q-learning")).model_validate(settings)

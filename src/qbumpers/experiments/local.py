@@ -1,7 +1,6 @@
 """Cells on this machine: threads if compiled loops let each other run, else processes."""
 
 import itertools
-import os
 from collections.abc import Generator, Iterable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -10,6 +9,7 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.workers import make_pool, some_finished, submit
 
 
@@ -17,7 +17,7 @@ class ThisMachine:
     """Cores of this machine: threads of this process, or processes if a task needs them.
 
     Args:
-        workers: how many; all cores if None.
+        workers: how many; all usable cores if None.
 
     Raises:
         RequestError: if `workers` is below 1.
@@ -26,7 +26,7 @@ class ThisMachine:
     def __init__(self, workers: int | None = None) -> None:
         if workers is not None and workers < 1:
             raise RequestError(f"workers = {workers!r}; at least 1 is needed")
-        self.cores = workers or os.cpu_count() or 1
+        self.cores = workers or usable_cores()
 
     def __call__(self, plan: Plan, seconds: dict[Cell, float]) -> Generator[Finished]:
         """Do the work of cells and yield each as it is finished, in any order.

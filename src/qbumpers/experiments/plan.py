@@ -5,12 +5,17 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.design import Experiment, NamedCondition
+from qbumpers.experiments.identity import Identity, identity_of
+from qbumpers.experiments.learner_designs import RecordedLearner
+from qbumpers.experiments.record import Record, RecordedCondition, file_name, recorded
 from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
-from qbumpers.simulation import Condition, make_condition
+from qbumpers.simulation import Condition, engine_of, make_condition
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import Task
 from qbumpers.values import (
@@ -44,6 +49,9 @@ class Plan(NamedTuple):
         values: Q* of its assistants.
         named: the conditions as the experiment names them, each with the digest of its content.
         conditions: what the trials of each content need.
+        record: what an output folder notes of the conditions.
+        files: what is in the files that options and settings name, by the names under which an
+            output folder keeps it.
     """
 
     experiment: Experiment
@@ -51,13 +59,16 @@ class Plan(NamedTuple):
     values: TabularValues | NetworkValues
     named: list[tuple[NamedCondition, str]]
     conditions: dict[str, Condition]
+    record: Record
+    files: dict[str, np.ndarray]
 
 
-def make_plan(experiment: Experiment) -> Plan:
+def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | None = None) -> Plan:
     """Check a whole experiment.
 
     Args:
         experiment: what it was made from.
+        values: Q* in place of what the experiment names: what an output folder keeps of its run.
 
     Returns:
         The plan.
@@ -70,12 +81,17 @@ def make_plan(experiment: Experiment) -> Plan:
     """
     task = experiment.task.task()
     for learner in experiment.learners:
+        if isinstance(learner, RecordedLearner):
+            raise RequestError(
+                f"learners.name = {learner.name!r}: no learner of that name with these settings is "
+                "registered here"
+            )
         if (learner.observes == "states") != (task.states > 0):
             raise RequestError(
                 f"learners.name = {learner.name!r}; it observes {learner.observes}, and task "
                 f"{task.name} is learned by {' or '.join(map(repr, task.learners))}"
             )
-    values = _values(experiment.values, task)
+    values = _values(experiment.values, task) if values is None else values
     named, conditions = [], {}
     for each in experiment.conditions():
         condition = make_condition(
@@ -92,7 +108,40 @@ def make_plan(experiment: Experiment) -> Plan:
         conditions[content] = condition
     if not task.states:
         check_expert(task, values)
-    return Plan(experiment, task, values, named, conditions)
+    files: dict[str, np.ndarray] = {}
+    noted = _noted(task, named, conditions, files)
+    record = noted._replace(task=task.digest(), values=values.digest())
+    return Plan(experiment, task, values, named, conditions, record, files)
+
+
+def _noted(
+    task: Task,
+    named: list[tuple[NamedCondition, str]],
+    conditions: dict[str, Condition],
+    files: dict[str, np.ndarray],
+) -> Record:
+    """What is noted of conditions; their code is looked at here, once, by the one who asks.
+
+    Args:
+        task: of the experiment.
+        named: its conditions.
+        conditions: the same by content.
+        files: is filled with what is in the files that they name.
+    """
+    engine = engine_of(task)
+    about = {"revision": engine.REVISION, "precision": engine.PRECISION}
+    found: dict[Any, Identity] = {}
+    noted: list[RecordedCondition] = []
+    for each, content in named:
+        rules, learner = tuple(each.assistant.chain), conditions[content].learner_type
+        key = (*map(id, rules), id(learner))
+        if key not in found:
+            found[key] = identity_of(each.assistant, learner, task, about)
+        read = {**each.assistant.files, **conditions[content].files}
+        names = {name: file_name(numbers) for name, numbers in read.items()}
+        files |= {names[name]: numbers for name, numbers in read.items()}
+        noted.append(recorded(each, content, found[key].digest, names))
+    return Record(noted, identities={one.digest: one.parts for one in found.values()})
 
 
 def _values(source: str, task: Task) -> TabularValues | NetworkValues:

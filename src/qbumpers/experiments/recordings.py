@@ -9,11 +9,13 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import polars as pl
 
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.store import load
+from qbumpers.experiments.store import kept_files, load
+from qbumpers.registration import files_from
 from qbumpers.simulation import record
 from qbumpers.tasks import Task
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
@@ -36,6 +38,9 @@ def export_recording(
     that was undone, the observation is the one before it. Episodes in which the assistant is gone
     are there too, with probability 0.
 
+    Q* and the files that options name are those that the folder keeps, and what is played is
+    compared with the run.
+
     Args:
         folder: output folder of the run.
         condition: a readable id in its `episodes.parquet`.
@@ -48,24 +53,48 @@ def export_recording(
 
     Raises:
         RequestError: if the folder is not one of a finished run, the condition or a trial is not
-            in it, the dataset is there already or badly named, or Minari is not installed.
+            in it, what is played is not what was run, the dataset is there already or badly named,
+            or Minari is not installed.
     """
     if not _VERSIONED.search(dataset):
         raise RequestError(
             f"dataset = {dataset!r}; a name with a version, such as 'cliff/bumpers-v0', is needed"
         )
-    plan = make_plan(load(folder).experiment)
+    results = load(folder)
+    noted = {each.condition: each for each in results.conditions}
+    if condition not in noted:
+        raise unknown_name("condition", condition, noted)
+    which = _checked(trials, results.experiment.trials)
+    files = [kept_files(folder, each) for each in (*results.conditions, noted[condition])]
+    with files_from({name: numbers for found in files for name, numbers in found.items()}):
+        plan = make_plan(results.experiment, results.values)
     contents = {named.condition: content for named, content in plan.named}
-    if condition not in contents:
-        raise unknown_name("condition", condition, contents)
     chosen, seed = plan.conditions[contents[condition]], plan.experiment.seed
     episodes = [
         episode
-        for trial in _checked(trials, plan.experiment.trials)
+        for trial in which
         for episode in _episodes(trial, record(chosen, trial=trial, seed=seed))
     ]
+    _check_same(results.episodes.filter(condition=condition), episodes)
     _write(dataset, condition, chosen.task, episodes)
     return len(episodes)
+
+
+def _check_same(run: pl.DataFrame, episodes: Sequence[Mapping[str, Any]]) -> None:
+    """Refuse episodes that are not those of the run: its code or its task changed since."""
+    columns = ("trial", "episode", "assisted_return", "assisted_length", "overrides")
+    rows = {row[:2]: row[2:] for row in run.select(columns).iter_rows()}
+    for each in episodes:
+        infos = each["infos"]
+        place = (int(infos["trial"][0]), int(infos["episode"][0]))
+        total, then = float(np.sum(each["rewards"])), rows[place]
+        now = (len(each["actions"]), int(infos["overridden"].sum()))
+        if now != then[1:] or not np.isclose(total, then[0], rtol=1e-9, atol=1e-9):
+            raise RequestError(
+                f"trial {place[0]} is not what was run: in episode {place[1]} the return is "
+                f"{total:g} and was {then[0]:g}, with {now[1]} overrides in {now[0]} steps and "
+                f"{then[2]} in {then[1]}; the code, the task or a library changed since"
+            )
 
 
 def _checked(trials: int | range, run: int) -> range:

@@ -35,6 +35,7 @@ class RunProgress(NamedTuple):
         steps: how many steps learners took in this run.
         expected: seconds that this run will take, by calibration, from its start.
         damaged: files of an earlier run that were damaged; their trials are run again.
+        changed: why finished trials of an earlier run are simulated again, a sentence each.
     """
 
     trials: int
@@ -42,6 +43,7 @@ class RunProgress(NamedTuple):
     steps: int
     expected: float
     damaged: list[str]
+    changed: list[str]
 
 
 def run_experiment(
@@ -65,9 +67,9 @@ def run_experiment(
     """
     backend = backend or ThisMachine()
     design = plan.experiment
-    with open_store(folder, design) as store:
-        store.write_values(plan.values)
-        found = store.survey(plan.conditions)
+    with open_store(folder, design, plan.record) as store:
+        store.write_inputs(plan.values, plan.files)
+        found = store.survey(design.trials)
         cells = {
             content: tiles(content, design.trials, design.trials_a_cell(), found.cells[content])
             for content in plan.conditions
@@ -82,7 +84,7 @@ def run_experiment(
         seconds = estimated_seconds(plan, missing)
         expected = sum(seconds.values()) / backend.cores
         done = total - sum(cell.trials for cell in missing)
-        progress = RunProgress(done, total, 0, expected, found.damaged)
+        progress = RunProgress(done, total, 0, expected, found.damaged, found.changed)
         report(progress)
         with contextlib.closing(backend(plan, seconds)) as work:
             for finished in work:
@@ -92,4 +94,4 @@ def run_experiment(
                     steps=progress.steps + finished.steps,
                 )
                 report(progress)
-        store.assemble([(named, cells[content]) for named, content in plan.named])
+        store.assemble(cells)

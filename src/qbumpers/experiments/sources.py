@@ -1,5 +1,6 @@
 """Experiments from TOML files and from plain data."""
 
+import codecs
 import math
 import tomllib
 from pathlib import Path
@@ -10,7 +11,25 @@ from pydantic import ValidationError
 from qbumpers.errors import RequestError, from_validation
 from qbumpers.experiments.cells import MANY_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign
-from qbumpers.experiments.learner_designs import field_names
+from qbumpers.experiments.learner_designs import RECORDED, field_names
+
+
+def recorded_experiment(settings: dict[str, Any], where: str) -> Experiment:
+    """The experiment of a run, as its output folder notes it.
+
+    What it names, rules, learners, tasks and files, need not be there any more.
+
+    Args:
+        settings: of the run, every field spelt out.
+        where: for messages, for example the path of the file.
+
+    Raises:
+        RequestError: naming each field that is wrong, its value and what is allowed.
+    """
+    try:
+        return Experiment.model_validate(settings, context=RECORDED)
+    except ValidationError as error:
+        raise from_validation(error, where, _field_names()) from error
 
 
 def make_experiment(
@@ -87,6 +106,10 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
         RequestError: if it is no TOML.
     """
     try:
-        return tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return tomllib.loads(content.decode("utf-8-sig"))  # some editors begin with a mark
+    except UnicodeDecodeError as error:
+        wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        found = "it is UTF-16" if wide else f"byte {error.start + 1} is not UTF-8"
+        raise RequestError(f"{where}: not valid TOML: {found}; save it as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
         raise RequestError(f"{where}: not valid TOML: {error}") from error

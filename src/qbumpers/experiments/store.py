@@ -5,21 +5,39 @@ import hashlib
 import importlib.metadata
 import io
 import platform
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import polars as pl
 import tomli_w
 
 import qbumpers
-from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.design import Experiment, NamedCondition
-from qbumpers.experiments.sources import make_experiment, parsed
+from qbumpers.experiments.design import Experiment
+from qbumpers.experiments.record import (
+    CONDITIONS,
+    FILES,
+    Record,
+    RecordedCondition,
+    decoded_record,
+    is_kept_file,
+    recorded,
+)
+from qbumpers.experiments.reuse import (
+    CellFile,
+    again,
+    cell_file_name,
+    cell_files,
+    cells_folder,
+    is_cell_file,
+    usable_for,
+    whole_cells,
+)
+from qbumpers.experiments.sources import parsed, recorded_experiment
 from qbumpers.files import Folder, StoreError, open_folder
 from qbumpers.values import NetworkValues, TabularValues, decoded_values
 
@@ -31,15 +49,13 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
 )
 """Files of an output folder; design and platform, a row per episode, a row per state, Q*."""
 
-NEEDED = (EXPERIMENT, EPISODES, STATES, VALUES)
+NEEDED = (EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES)
 """What the analysis reads."""
 
-FORMAT = 2
+FORMAT = 3
 """Of an output folder: what its files are called and hold."""
 
-_FILE = re.compile(
-    r"(?P<first>\d+)-(?P<trials>\d+)-(?P<kind>\w+)-(?P<digest>[0-9a-f]{16})\.parquet"
-)
+_READ = (2, FORMAT)  # formats that are read; before 3, folders noted no conditions
 
 # An experiment may be continued with more or fewer of the first three, and be read in another way.
 _CHANGING = {"trials", "assistants", "learners", "criterion", "reproduces"}
@@ -57,102 +73,114 @@ class Results(NamedTuple):
         episodes: a row per episode.
         states: a row per condition and state; None if observations are vectors.
         values: Q* of the assistants.
+        conditions: what is noted of each.
     """
 
     experiment: Experiment
     episodes: pl.DataFrame
     states: pl.DataFrame | None
     values: TabularValues | NetworkValues
+    conditions: Sequence[RecordedCondition]
 
 
 class Survey(NamedTuple):
     """What finished work an output folder holds.
 
     Attributes:
-        cells: whole cells, by their content.
+        cells: whole cells that may be used, by their content.
         damaged: names of files that did not hold what was once written; they are gone.
+        changed: why finished trials are simulated again, a sentence each; their cells stay.
     """
 
     cells: dict[str, list[Cell]]
     damaged: list[str]
+    changed: list[str]
 
 
 class Store:
     """The output folder of one experiment; `open_store` opens it.
 
-    The file of a cell's table is named by the cell and by a digest of its bytes, so that damage
-    shows wherever it is.
+    The file of a cell's table is named by the cell, by the identity of what made it, and by a
+    digest of its bytes, so that damage shows wherever it is.
 
     Args:
         folder: where the results are, locked against other writers.
         tables: what a finished cell holds, see `tables_of`.
+        record: of the conditions that are run.
+        before: what the folder noted until now; None if that is nothing.
     """
 
-    def __init__(self, folder: Folder, tables: Sequence[str]) -> None:
+    def __init__(
+        self, folder: Folder, tables: Sequence[str], record: Record, before: Record | None
+    ) -> None:
         self._folder, self._tables = folder, tables
+        self._record, self._before = record, before
+        self._identities = {each.content: each.identity for each in record.conditions}
         self._files: dict[tuple[Cell, str], str] = {}
 
-    def survey(self, contents: Iterable[str]) -> Survey:
+    def survey(self, trials: int) -> Survey:
         """Look for finished cells, check them, and clear damaged files away.
 
         Args:
-            contents: digests of the conditions that are wanted.
+            trials: that are wanted of each condition.
 
         Returns:
             What there is.
         """
-        cells, damaged = {}, []
-        for content in contents:
-            kinds: dict[Cell, set[str]] = {}
-            for file in self._folder.names(_place(content)):
-                name = _FILE.fullmatch(file.rpartition("/")[2])
-                if name is None:
-                    continue
-                if _digest(self._folder.read(file) or b"") != name["digest"]:
-                    damaged.append(file)
-                    self._folder.remove(file)
-                    continue
-                cell = Cell(content, int(name["first"]), int(name["trials"]))
-                kind = f"{name['kind']}.parquet"
-                self._files[cell, kind] = file
-                kinds.setdefault(cell, set()).add(kind)
-            cells[content] = [cell for cell, found in kinds.items() if found == set(self._tables)]
-        return Survey(cells, damaged)
+        cells, stale, damaged = {}, {}, []
+        for content, wanted in self._identities.items():
+            files = cell_files(self._folder, content)
+            usable = [f for f in files if usable_for(wanted, f.identity, self._record)]
+            whole = [file for file in usable if self._is_whole(file)]
+            damaged += [file.name for file in usable if file not in whole]
+            self._files |= {(file.cell, file.kind): file.name for file in whole}
+            cells[content] = whole_cells(whole, self._tables)
+            stale[content] = [file for file in files if file not in usable]
+
+        def stale_of(content: str) -> list[CellFile]:
+            return stale[content] if content in stale else cell_files(self._folder, content)
+
+        for name in damaged:
+            self._folder.remove(name)
+        changed = again(self._record, self._before, cells, stale_of, trials)
+        return Survey(cells, damaged, changed)
+
+    def _is_whole(self, file: CellFile) -> bool:
+        return _digest(self._folder.read(file.name) or b"") == file.digest
 
     def write(self, cell: Cell, files: Mapping[str, bytes]) -> None:
         """Keep the tables of a cell, encoded, by kind; it is whole when all are there."""
         for kind, content in files.items():
-            stem = f"{cell.first:06d}-{cell.trials}-{kind.removesuffix('.parquet')}"
-            name = f"{_place(cell.content)}/{stem}-{_digest(content)}.parquet"
+            name = cell_file_name(cell, kind, self._identities[cell.content], _digest(content))
             self._folder.write(name, content)
             self._files[cell, kind] = name
 
-    def write_values(self, values: TabularValues | NetworkValues) -> None:
-        """Keep the assistants' Q*."""
+    def write_inputs(
+        self, values: TabularValues | NetworkValues, files: Mapping[str, np.ndarray]
+    ) -> None:
+        """Keep the assistants' Q*, and what is in files that conditions name, by `file_name`."""
         self._folder.write(VALUES, values.encoded())
+        for name, numbers in files.items():
+            buffer = io.BytesIO()
+            np.save(buffer, numbers)
+            self._folder.write(name, buffer.getvalue())
 
-    def assemble(self, parts: Iterable[tuple[NamedCondition, Sequence[Cell]]]) -> None:
+    def assemble(self, cells: Mapping[str, Sequence[Cell]]) -> None:
         """Write the tables of the whole experiment from its finished cells.
 
         Args:
-            parts: the cells of each condition, in the order of their trials.
+            cells: of each content, in the order of their trials.
 
         Raises:
             StoreError: if a cell cannot be read, or a table cannot be written.
         """
-        cells = [(named, cell) for named, chosen in parts for cell in chosen]
         for kind in self._tables:
-            with ThreadPoolExecutor() as pool:
-                table = pl.concat(
-                    pool.map(lambda part, kind=kind: self._labelled(part[0], part[1], kind), cells)
-                )
-            if kind == STATES:
-                keys = ["condition", "state", "row", "column"]
-                table = table.group_by(keys, maintain_order=True).sum()
+            table = assembled(
+                [(each, cell) for each in self._record.conditions for cell in cells[each.content]],
+                kind,
+                lambda cell, kind=kind: self.read(cell, kind),
+            )
             self._folder.write(kind, encoded(table))
-
-    def _labelled(self, named: NamedCondition, cell: Cell, kind: str) -> pl.DataFrame:
-        return self.read(cell, kind).select(*_labels(named, kind), pl.all())
 
     def read(self, cell: Cell, kind: str) -> pl.DataFrame:
         """A table of a cell that was written or surveyed; StoreError if it is damaged."""
@@ -175,44 +203,66 @@ def encoded(table: pl.DataFrame) -> bytes:
     return buffer.getvalue()
 
 
-def _place(content: str) -> str:
-    return f"cells/{content[:16]}"
-
-
-def _labels(named: NamedCondition, kind: str) -> list[pl.Expr]:
-    """Columns that say whose rows these are."""
-    labels = [pl.lit(named.condition).alias("condition")]
-    if kind == EPISODES:
-        alpha = _alpha_of(named.assistant)
-        labels += [
-            pl.lit(named.assistant.name).alias("assistant"),
-            pl.lit(alpha, pl.Float64).alias("alpha"),
-            pl.lit(named.learner_id).alias("learner"),
-        ]
-    return labels
-
-
-def _alpha_of(assistant: Assistant | None) -> float | None:
-    """The option alpha of an assistant or of one that it is over."""
-    while assistant is not None:
-        options = assistant.options._asdict()
-        if "alpha" in options:
-            return options["alpha"]
-        assistant = assistant.of
-    return None
-
-
 def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:16]
 
 
+def _clear_left(folder: Folder, records: Sequence[Record]) -> None:
+    """Clear away what killed runs left half-written of their own files, and of no others."""
+    own = {EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES}
+    folder.clear_left("", own.__contains__)
+    folder.clear_left(FILES, is_kept_file)
+    for place in {cells_folder(each.content) for record in records for each in record.conditions}:
+        folder.clear_left(place, is_cell_file)
+
+
+def assembled(
+    parts: Sequence[tuple[RecordedCondition, Cell]],
+    kind: str,
+    read: Callable[[Cell], pl.DataFrame],
+) -> pl.DataFrame:
+    """One table of many cells.
+
+    Args:
+        parts: cells with the conditions that they are of; at least one.
+        kind: of table.
+        read: reads the table of a cell.
+
+    Returns:
+        `episodes.parquet` or `states.parquet`.
+    """
+
+    def labelled(part: tuple[RecordedCondition, Cell]) -> pl.DataFrame:
+        return read(part[1]).select(*_labels(part[0], kind), pl.all())
+
+    with ThreadPoolExecutor() as pool:
+        table = pl.concat(pool.map(labelled, parts))
+    if kind == STATES:
+        keys = ["condition", "state", "row", "column"]
+        return table.group_by(keys, maintain_order=True).sum()
+    return table
+
+
+def _labels(each: RecordedCondition, kind: str) -> list[pl.Expr]:
+    """Columns that say whose rows these are."""
+    labels = [pl.lit(each.condition).alias("condition")]
+    if kind == EPISODES:
+        labels += [
+            pl.lit(each.assistant).alias("assistant"),
+            pl.lit(each.alpha, pl.Float64).alias("alpha"),
+            pl.lit(each.learner).alias("learner"),
+        ]
+    return labels
+
+
 @contextlib.contextmanager
-def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
+def open_store(folder: str | Path, experiment: Experiment, record: Record) -> Iterator[Store]:
     """Open an output folder for one run, which alone writes to it.
 
     Args:
         folder: where the results go, a path or a URL; made if it is missing.
         experiment: to be run, or continued.
+        record: of its conditions.
 
     Yields:
         The store, with what a killed run left half-written cleared away.
@@ -224,14 +274,19 @@ def open_store(folder: str | Path, experiment: Experiment) -> Iterator[Store]:
     """
     place = open_folder(folder)
     with place.locked():
-        found = _read_design(place)
+        found, before = _read_design(place), decoded_record(place.read(CONDITIONS))
         if found is not None:
             _check_same(place, found, experiment)
-            if _renamed(found, experiment):  # or a stopped run would pass old rows off as its own
-                for table in tables_of(experiment):
+            _check_inputs(place, before, experiment, record)
+            if _renamed(found, before, experiment, record):
+                for table in tables_of(experiment):  # or a stopped run would pass them off
                     place.remove(table)
+        if before is not None:
+            record = record._replace(identities={**before.identities, **record.identities})
+        _clear_left(place, [record, *([before] if before else [])])
+        place.write(CONDITIONS, record.encoded())
         place.write(EXPERIMENT, _described(experiment).encode())
-        yield Store(place, tables_of(experiment))
+        yield Store(place, tables_of(experiment), record, before)
 
 
 def load(folder: str | Path) -> Results:
@@ -247,9 +302,7 @@ def load(folder: str | Path) -> Results:
         RequestError: if the folder is not one of a finished run, or damaged.
     """
     place = open_folder(folder)
-    experiment = _read_design(place)
-    if experiment is None:
-        raise RequestError(f"results folder {folder}: it holds no {EXPERIMENT}")
+    experiment = load_design(folder)
     contents = {name: place.read(name) for name in tables_of(experiment)}
     if None in contents.values():
         raise _unfinished(place)
@@ -260,12 +313,38 @@ def load(folder: str | Path) -> Results:
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
     episodes = tables[EPISODES]
-    conditions = {named.condition for named in experiment.conditions()}
+    conditions = conditions_of(folder, experiment, episodes)
     rows = len(conditions) * experiment.trials * (experiment.episodes + experiment.retention)
-    if episodes.height != rows or set(episodes["condition"].unique()) != conditions:
+    ids = {each.condition for each in conditions}
+    if episodes.height != rows or set(episodes["condition"].unique()) != ids:
         raise _unfinished(place)
     values = decoded_values(place.read(VALUES) or b"", f"{folder}/{VALUES}")
-    return Results(experiment, episodes, tables.get(STATES), values)
+    return Results(experiment, episodes, tables.get(STATES), values, conditions)
+
+
+def conditions_of(
+    folder: str | Path, experiment: Experiment, table: pl.DataFrame
+) -> Sequence[RecordedCondition]:
+    """What a folder notes of its conditions; an old one does not, then it is found out.
+
+    Args:
+        folder: of the results.
+        experiment: as run.
+        table: with columns condition, assistant, alpha and learner.
+    """
+    record = decoded_record(open_folder(folder).read(CONDITIONS))
+    if record is not None:
+        return record.conditions
+    try:
+        return [recorded(named) for named in experiment.conditions()]
+    except RequestError:  # what they name is not there any more
+        columns = ("condition", "assistant", "alpha", "learner")
+        return [
+            RecordedCondition(
+                **row, options={} if row["alpha"] is None else {"alpha": row["alpha"]}
+            )
+            for row in table.select(columns).unique(maintain_order=True).iter_rows(named=True)
+        ]
 
 
 def _unfinished(folder: Folder) -> RequestError:
@@ -286,6 +365,18 @@ def _described(experiment: Experiment) -> str:
     return tomli_w.dumps({**settings, "run": run})
 
 
+def load_design(folder: str | Path) -> Experiment:
+    """The experiment of an output folder, as run.
+
+    Raises:
+        RequestError: where there is none, or it is damaged or of a version that is not read here.
+    """
+    experiment = _read_design(open_folder(folder))
+    if experiment is None:
+        raise RequestError(f"results folder {folder}: it holds no {EXPERIMENT}")
+    return experiment
+
+
 def _read_design(folder: Folder) -> Experiment | None:
     """The experiment of an output folder; None if there is none."""
     content = folder.read(EXPERIMENT)
@@ -293,14 +384,14 @@ def _read_design(folder: Folder) -> Experiment | None:
         return None
     settings = parsed(content, f"experiment file {folder}/{EXPERIMENT}")
     found = settings.get("run", {}).get("format", 1)
-    if found != FORMAT:
+    if found not in _READ:
         age = "a newer" if isinstance(found, int) and found > FORMAT else "an older"
         raise RequestError(
             f"output folder {folder}: written by {age} version of qbumpers (format {found!r}, "
             f"needed {FORMAT}); choose another folder"
         )
     del settings["run"]
-    return make_experiment(settings, f"experiment file {folder}/{EXPERIMENT}", large=True)
+    return recorded_experiment(settings, f"experiment file {folder}/{EXPERIMENT}")
 
 
 def _check_same(folder: Folder, found: Experiment, experiment: Experiment) -> None:
@@ -313,10 +404,56 @@ def _check_same(folder: Folder, found: Experiment, experiment: Experiment) -> No
         )
 
 
-def _renamed(found: Experiment, experiment: Experiment) -> bool:
-    """Whether an id means another condition than it did."""
-    before = {named.condition: named for named in found.conditions()}
-    return any(before.get(named.condition, named) != named for named in experiment.conditions())
+def _check_inputs(
+    folder: Folder, before: Record | None, experiment: Experiment, record: Record
+) -> None:
+    """Refuse Q* or a task that are others by now under the name that they had."""
+    changed = []
+    if before is not None and before.task not in ("", record.task):
+        changed.append(f"task {experiment.task.name!r} does not behave as it did")
+    with contextlib.suppress(RequestError):  # what is damaged is written anew
+        kept = decoded_values(folder.read(VALUES) or b"", VALUES)
+        if kept.digest() != record.values:
+            changed.append(f"values = {experiment.values!r} are not those in its {VALUES}")
+    if changed:
+        raise RequestError(
+            f"output folder {folder} holds another experiment ({'; '.join(changed)}); choose "
+            "another folder"
+        )
+
+
+def kept_files(folder: str | Path, each: RecordedCondition) -> dict[str, np.ndarray]:
+    """What was in the files that a condition named when it was run.
+
+    Args:
+        folder: of the results.
+        each: the condition.
+
+    Returns:
+        Float64 [N, K] by the name that the experiment has for a file; nothing from old folders.
+    """
+    place = open_folder(folder)
+    contents = {name: place.read(kept) for name, kept in each.files.items()}
+    return {name: np.load(io.BytesIO(found)) for name, found in contents.items() if found}
+
+
+def _renamed(
+    found: Experiment, before: Record | None, experiment: Experiment, record: Record
+) -> bool:
+    """Whether an id may mean another condition than it did, or one that other code made."""
+    if before is None:
+        own = any(not record.allows_unmarked(each.identity) for each in record.conditions)
+        return own or any(
+            getattr(found, field) != getattr(experiment, field)
+            for field in ("assistants", "learners")
+        )
+    then = before.by_id()
+    return any(
+        each.condition in then
+        and (then[each.condition].content, then[each.condition].identity)
+        != (each.content, each.identity)
+        for each in record.conditions
+    )
 
 
 def run_description(folder: str | Path) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 (Ho, Littman and Austerweil 2017 discuss interruption, transition and disruption.)
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -35,14 +37,18 @@ class Perception(NamedTuple):
     penalty: Annotated[float, Field(allow_inf_nan=False)] = 0.0
 
 
-PERCEPTIONS = {
-    "transition": Perception(0.0, "proposed", 0.0),
-    "observant": Perception(1.0, "executed", 0.0),
-    "interruption": Perception(1.0, "nothing", 0.0),
-    "disruption": Perception(1.0, "executed", 1.0),
-    "transition-disruption": Perception(1.0, "proposed", 1.0),
-}
-"""Perceptions by name; `transition` is the paper's (Section 2.3)."""
+PERCEPTIONS: Mapping[str, Perception] = MappingProxyType(
+    {
+        "transition": Perception(0.0, "proposed", 0.0),
+        "observant": Perception(1.0, "executed", 0.0),
+        "interruption": Perception(1.0, "nothing", 0.0),
+        "disruption": Perception(1.0, "executed", 1.0),
+        "transition-disruption": Perception(1.0, "proposed", 1.0),
+    }
+)
+"""Perceptions by name; `transition` is the paper's (Section 2.3).
+
+There cannot be others: stored results state the name alone."""
 
 
 def perception(name: str) -> Perception:

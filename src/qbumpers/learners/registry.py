@@ -8,10 +8,17 @@ from typing import Any, Literal
 import numpy as np
 
 from qbumpers.borrowing import read_only
-from qbumpers.compilation import is_of_package, result_type, type_of
+from qbumpers.compilation import is_compiled, is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
-from qbumpers.registration import checked_class, compiled_or_plain, fresh_class, sample
+from qbumpers.registration import (
+    checked_class,
+    compiled_or_plain,
+    fresh_class,
+    is_written_here,
+    original_class,
+    sample,
+)
 
 Observes = Literal["states", "vectors"]
 
@@ -26,6 +33,7 @@ class LearnerType:
         observes: "states" by number, or "vectors".
         compiled: whether Numba could compile all of it.
         built_in: whether it belongs to this package, whose compiled code is kept on disk.
+        revision: raised when the numbers that it gives change although its code does not show it.
     """
 
     name: str
@@ -39,6 +47,13 @@ class LearnerType:
     observes: Observes
     compiled: bool
     built_in: bool
+    revision: int = 1
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """What it was registered with: its functions, None for those it lacks, and its settings."""
+        functions = (self.start, self.choose, self.prefer, self.policy, self.learn, self.begin)
+        return (*functions, original_class(self.settings_type))
 
 
 _FUNCTIONS = ("start", "choose", "prefer", "policy", "learn", "begin")
@@ -58,6 +73,7 @@ def register_learner(
     learn: Callable[..., None],
     begin: Callable[..., Any] | None = None,
     observes: Observes = "states",
+    revision: int = 1,
 ) -> type:
     """Register a learner under a name; it then works in every simulator, in files and in `list`.
 
@@ -81,6 +97,8 @@ def register_learner(
         begin: `(settings, memory, episode, episodes) -> rates`, the numbers of an episode, for
             instance a `qbumpers.learners.interface.Rates`; 0 if there is none.
         observes: "states" by number, or "vectors", float32 [D].
+        revision: to be raised when the learner gives other numbers for a reason that its code does
+            not show; finished trials are then simulated again.
 
     Returns:
         The class of its settings, with which `simulate` takes it: call it with fields by name.
@@ -93,9 +111,11 @@ def register_learner(
     if missing:
         raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
+    built_in = built_in and all(map(is_written_here, (settings_type, start, begin)))
     learner = LearnerType(
-        name, settings_type, start, choose, prefer, policy, learn, begin, observes, True, built_in
-    )
+        name, settings_type, start, choose, prefer, policy, learn, begin, observes,
+        is_compiled(choose), built_in, revision,
+    )  # fmt: skip
     if not built_in:
         learner = _of_user(learner)
     _learners[name] = learner

@@ -18,7 +18,8 @@ from numba import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic, models, register_model
 
-from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.compilation import compiled, compiled_apart, compiles
+from qbumpers.networks import interpreted
 
 WIDE, NARROW, SCALAR = 32, 4, 1
 """How many numbers are worked on together, if so many are left."""
@@ -53,6 +54,8 @@ class _VectorModel(models.PrimitiveModel):
 
 def _instructions(build: Callable[..., Any]) -> Callable[..., Any]:
     """A function whose calls become a few instructions, built from the types of its arguments."""
+    if not compiles():
+        return getattr(interpreted, build.__name__)
     return intrinsic(prefer_literal=True)(build)
 
 

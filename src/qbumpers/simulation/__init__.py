@@ -2,7 +2,7 @@
 
 from qbumpers.simulation.condition import Condition, Setup, make_condition
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
-from qbumpers.simulation.trials import record, run, simulate
+from qbumpers.simulation.trials import engine_of, record, run, simulate
 
 __all__ = [
     "Condition",
@@ -11,6 +11,7 @@ __all__ = [
     "Setup",
     "Simulation",
     "StateCounts",
+    "engine_of",
     "make_condition",
     "record",
     "run",

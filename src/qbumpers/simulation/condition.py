@@ -1,6 +1,7 @@
 """What a trial needs, checked before any of it runs."""
 
 import hashlib
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
@@ -12,7 +13,7 @@ from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
-from qbumpers.registration import as_numbers
+from qbumpers.registration import as_numbers, files_from, files_in
 from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
@@ -72,6 +73,7 @@ class Condition(NamedTuple):
         episodes: E, assisted episodes of a trial, each followed by a greedy unassisted one.
         retention: R, further episodes in which the learner goes on without the assistant.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+        files: what is in the files that the learner's settings name, float64 [N, K] by name.
     """
 
     task: Task
@@ -87,6 +89,7 @@ class Condition(NamedTuple):
     episodes: int = 100
     retention: int = 0
     common_random_numbers: bool = False
+    files: Mapping[str, np.ndarray] = {}
 
     def __reduce__(self) -> Any:
         """Pickle with the user's own rules and learner, which are registered on unpickling."""
@@ -141,7 +144,7 @@ class Condition(NamedTuple):
             "motor": _plain(self.motor) if self.motor != Motor() else None,
             "forgetting": self.forgetting,
             "others": _digest(self.others) if self.assistant.values else "",
-            "files": _file_digests(self.assistant),
+            "files": [*_file_digests(self.assistant), *map(_digest, self.files.values())],
         }
         return {
             "task": self.task.digest(),
@@ -226,7 +229,7 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
         setup.get("common_random_numbers", False),
     )
     _check_numbers(condition)
-    return condition
+    return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
 
 
 def _check_numbers(condition: Condition) -> None:
@@ -319,7 +322,8 @@ def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | Non
     motor = None if condition.motor == Motor() else condition.motor
     forgetting = float(condition.forgetting) if condition.forgetting else None
     perception = as_numbers(condition.perceived())
-    return as_numbers(condition.learner), perception, motor, forgetting
+    with files_from(condition.files):
+        return as_numbers(condition.learner), perception, motor, forgetting
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:

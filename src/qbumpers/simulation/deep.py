@@ -25,6 +25,11 @@ from qbumpers.simulation.deep_steps import (
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
+REVISION: int = 1
+"""Raised when trials give other numbers by anything that is no rule, learner or task."""
+
+PRECISION: str = "float32"
+
 _ENDED = TERMINATED | TRUNCATED
 
 _SESSION = {f: compiled_for_session(uncompiled(f)) for f in (hold, act, take, preferred)}

@@ -204,7 +204,7 @@ def take(
         rule_memory: what the assistant's rule remembers; 0 if that is nothing.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
-        outcome: the fields of `Outcome`.
+        outcome: what the environment answered, the fields of `Outcome`.
 
     Returns:
         The action that the learner credits (-1 for none), the projected return of its proposal, the

@@ -16,6 +16,8 @@ from qbumpers.assistants import assistants, register_assistant
 from qbumpers.assistants.registry import Rule
 from qbumpers.compilation import compilation_settings, compiled_with, uncompiled
 from qbumpers.learners import LearnerType, learners, register_learner
+from qbumpers.registration import original_class
+from qbumpers.source import Meaning, meaning_of
 
 
 class _Function(NamedTuple):
@@ -50,7 +52,11 @@ class Own:
     def __init__(self, rules: Iterable[Rule], kinds: Iterable[LearnerType]) -> None:
         own = [each for each in (*rules, *kinds) if not each.built_in]
         # Rules over rules come first and are registered last: they are compiled with others inside.
-        self.packed = tuple((type(each) is Rule, each.name, _packed(each)) for each in own[::-1])
+        self.packed = tuple(
+            # What a rule refers to may have changed since it was packed before.
+            (type(each) is Rule, each.name, _packed(each, tuple(_meaning(each).code.items())))
+            for each in own[::-1]
+        )
 
     def __reduce__(self) -> Any:
         return _register_all, (self.packed,)
@@ -65,38 +71,28 @@ def packed(conditions: Mapping[str, Any]) -> bytes:
     Returns:
         Bytes, which `pickle.loads` unpacks in a process that has this package.
     """
-    import cloudpickle
-
     own = [
         each
         for condition in conditions.values()
         for each in (*condition.assistant.chain, condition.learner_type)
         if not each.built_in
     ]
-    with _by_value({module for each in own for module in _modules(_registration(each))}):
-        return cloudpickle.dumps(dict(conditions))
+    return _dumped(dict(conditions), list(dict.fromkeys(own)))
 
 
 @functools.lru_cache(maxsize=256)
-def _packed(registered: Rule | LearnerType) -> bytes:
-    import cloudpickle
-
-    registration = _registration(registered)
-    with _by_value(_modules(registration)):
-        return cloudpickle.dumps(registration)
+def _packed(registered: Rule | LearnerType, code: tuple[tuple[str, str], ...]) -> bytes:
+    return _dumped(_registration(registered), [registered])
 
 
 def _registration(registered: Rule | LearnerType) -> _Registration:
     rule = isinstance(registered, Rule)
     functions = ("decide", "start", "observe") if rule else _LEARNER_FUNCTIONS
     others = ("check_start", "needs", "values") if rule else ("observes",)
-    fresh: type = registered.options_type if rule else registered.settings_type
-    settings_type = fresh.__base__  # registering had made a fresh class of it
-    assert settings_type is not None
     return _Registration(
-        settings_type,
+        original_class(registered.options_type if rule else registered.settings_type),
         {name: _taken_apart(getattr(registered, name)) for name in functions},
-        {name: getattr(registered, name) for name in others},
+        {name: getattr(registered, name) for name in (*others, "revision")},
     )
 
 
@@ -139,17 +135,30 @@ def _register(is_rule: bool, name: str, given: _Registration) -> None:
             register_learner(name, given.settings_type, **functions, **given.others)
 
 
-def _modules(own: _Registration) -> list[str]:
-    """Modules that a user's rule or learner comes from, but for that of a script or notebook."""
-    sources = [f.source for f in own.functions.values() if f is not None]
-    parts = (own.settings_type, own.others.get("check_start"), *sources)
-    names = {part.__module__ for part in parts if part is not None}
-    package = __name__.partition(".")[0]
-    return sorted(
-        name
-        for name in names & sys.modules.keys() - {"__main__"}
-        if name.partition(".")[0] != package
-    )
+def _dumped(things: Any, own: Iterable[Rule | LearnerType]) -> bytes:
+    """Things pickled with the modules that users' rules and learners come from and refer to.
+
+    So they run elsewhere as they do here, whatever is there under the names of these modules. A
+    module that cannot be pickled whole goes by its name, if no rule or learner comes from it.
+    """
+    import cloudpickle
+
+    from_there = {_home(part) for each in own for part in each.parts if part is not None}
+    all_of_them = {module for each in own for module in _meaning(each).modules}
+    try:
+        with _by_value(all_of_them):
+            return cloudpickle.dumps(things)
+    except (TypeError, AttributeError, pickle.PicklingError):
+        with _by_value(from_there & all_of_them):
+            return cloudpickle.dumps(things)
+
+
+def _meaning(registered: Rule | LearnerType) -> Meaning:
+    return meaning_of({registered.name: registered.parts})
+
+
+def _home(part: Any) -> str:
+    return uncompiled(part).__module__
 
 
 @contextmanager
@@ -157,8 +166,8 @@ def _by_value(names: Iterable[str]) -> Iterator[None]:
     """Within the block, what comes from these modules is pickled whole, not by its name."""
     import cloudpickle
 
-    before = cloudpickle.list_registry_pickle_by_value()
-    modules = [sys.modules[name] for name in set(names) - before]
+    before = cloudpickle.list_registry_pickle_by_value() | {"__main__"}
+    modules = [sys.modules[name] for name in set(names) & sys.modules.keys() - before]
     for module in modules:
         cloudpickle.register_pickle_by_value(module)
     try:

@@ -16,6 +16,12 @@ from qbumpers.simulation.loops import (
 )
 from qbumpers.simulation.outcomes import Script, Simulation, Sinks, StateCounts, room_for_steps
 
+REVISION: int = 1
+"""Raised when trials give other numbers by anything that is no rule, learner or task: the loops,
+the streams, the account of an episode, perception, motor noise, forgetting."""
+
+PRECISION: str = "float64"
+
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
     """Simulate trials: `run_block` of `qbumpers.simulation.trials.Engine`."""

@@ -75,7 +75,15 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
 
 
 class Engine(Protocol):
-    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`."""
+    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`.
+
+    Attributes:
+        REVISION: raised when the numbers that it gives change.
+        PRECISION: of those numbers.
+    """
+
+    REVISION: int
+    PRECISION: str
 
     def run_block(self, condition: Condition, trials: range, seed: int) -> Simulation:
         """Simulate trials of a condition, one after another on one core.
@@ -83,7 +91,7 @@ class Engine(Protocol):
         Args:
             condition: what to simulate.
             trials: which trials.
-            seed: of the experiment's random streams.
+            seed: the experiment's, for the random streams.
         """
         ...
 
@@ -99,8 +107,8 @@ class Engine(Protocol):
 
         Args:
             condition: what to simulate.
-            trials: the one trial.
-            seed: of the experiment's random streams.
+            trials: a range of one trial.
+            seed: the experiment's, for the random streams.
             script: proposals and noise to be played again; None to draw them.
             interpreted: whether to run compiled code as plain Python, to be compared with.
         """

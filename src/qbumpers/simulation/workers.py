@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -17,6 +18,7 @@ from concurrent.futures import (
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
+from qbumpers.kept_code import KeptCodeWarning
 from qbumpers.tasks import Task
 
 Found = TypeVar("Found")
@@ -95,6 +97,7 @@ def _interrupts_later() -> Iterator[None]:
 
 def _follow_parent() -> None:
     """Leave Ctrl-C to the parent process, and end when it ends, even if it is killed."""
+    warnings.simplefilter("ignore", KeptCodeWarning)  # the parent has said it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_after_parent, daemon=True).start()
 

@@ -1,14 +1,20 @@
 """Environments as simulators step through them, one action at a time."""
 
+import sys
 from collections.abc import Mapping
+from types import ModuleType
 from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 
 from qbumpers.errors import RequestError
+from qbumpers.source import version_of
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
-from qbumpers.tasks.undoing import undo_of
+from qbumpers.tasks.undoing import layers_of, undo_of
+
+REVISION = 1
+"""Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
 
 _SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
 
@@ -91,6 +97,26 @@ class GymnasiumStepper:
     def restore(self, snapshot: Any) -> None:
         """As `UndoableStepper.restore`."""
         undo_of(self._environment)[1](snapshot)
+
+
+def stepped_by_of(environment: Any) -> tuple[Any, ...]:
+    """What decides the steps of a Gymnasium environment.
+
+    Args:
+        environment: with its wrappers, as `make_environment` makes it.
+
+    Returns:
+        Its class and those of its wrappers, what they were made with and, if it is an installed
+        one, the libraries that its modules import: one that steps it may be among them.
+    """
+    layers = [type(layer) for layer in layers_of(environment)]
+    spec = environment.spec
+    given = [] if spec is None else [spec.kwargs, [w.kwargs for w in spec.additional_wrappers]]
+    makes = [] if spec is None or isinstance(spec.entry_point, str) else [spec.entry_point]
+    installed = [k.__module__ for k in layers[-1].__mro__ if version_of(k.__module__)]
+    there = [each for name in installed for each in vars(sys.modules[name]).values()]
+    libraries = [e for e in there if isinstance(e, ModuleType) and version_of(e.__name__)]
+    return (*layers, *makes, *given, *dict.fromkeys(libraries))
 
 
 def make_environment(name: str, **arguments: Any) -> Any:

@@ -81,6 +81,8 @@ class TabularTask:
     releases_gil = True
     learners = ("q-learning", "sarsa", "expected-sarsa")
     value_sources = ("exact", "q-learning")
+    code = ()
+    revision = 1
 
     def __post_init__(self) -> None:
         """Check every field."""

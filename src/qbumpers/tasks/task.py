@@ -110,6 +110,16 @@ class Task(Protocol):
         """Whether simulations of it run in threads at once: none of it is Python."""
         ...
 
+    @property
+    def code(self) -> tuple[Any, ...]:
+        """What decides its steps beside its digest: functions, classes, modules of libraries."""
+        ...
+
+    @property
+    def revision(self) -> int:
+        """Raised when it gives other numbers for a reason that its code does not show."""
+        ...
+
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         ...

@@ -55,7 +55,7 @@ def undo_of(environment: gymnasium.Env[Any, Any]) -> tuple[Snapshot, Restore]:
         RequestError: if the environment lacks them, or a wrapper may keep something that would not
             be put back, and does not define both itself.
     """
-    for layer in _layers(environment):
+    for layer in layers_of(environment):
         kind = type(layer)
         if hasattr(kind, "snapshot") and hasattr(kind, "restore"):
             undoing: Any = layer
@@ -94,12 +94,12 @@ def reached_limit(environment: gymnasium.Env[Any, Any]) -> bool:
     # Gymnasium has no public name for either number.
     return any(
         (layer._elapsed_steps or 0) >= layer._max_episode_steps
-        for layer in _layers(environment)
+        for layer in layers_of(environment)
         if isinstance(layer, wrappers.TimeLimit)
     )
 
 
-def _layers(environment: Any) -> Iterator[gymnasium.Env[Any, Any]]:
+def layers_of(environment: Any) -> Iterator[gymnasium.Env[Any, Any]]:
     """The environment as it is given, and what it wraps, from the outside in."""
     while isinstance(environment, gymnasium.Wrapper):
         yield environment

@@ -15,7 +15,13 @@ from qbumpers.random_streams import content_digest
 from qbumpers.tasks.checking import check_common
 from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.dynamics import Dynamics
-from qbumpers.tasks.stepping import GymnasiumStepper, Stepper, make_environment
+from qbumpers.tasks.stepping import (
+    REVISION,
+    GymnasiumStepper,
+    Stepper,
+    make_environment,
+    stepped_by_of,
+)
 from qbumpers.tasks.task import distance_between
 from qbumpers.tasks.undoing import can_undo
 
@@ -45,6 +51,9 @@ class VectorTask:
         implied: `no_op` and `action_distance` that follow from the name and the settings; any
             others are part of the digest.
         make_display: makes `display` of the task; no part of its digest.
+        stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
+            classes and functions; and modules, for the versions of their libraries.
+        revision: raised when it gives other numbers for a reason that its code does not show.
 
     Raises:
         RequestError: if a size, the discount, the limit, an action or a distance is out of range,
@@ -66,6 +75,8 @@ class VectorTask:
     action_distance: np.ndarray | None = None
     implied: tuple[int, np.ndarray | None] = (-1, None)
     make_display: Callable[["VectorTask"], Any] | None = None
+    stepped_by: tuple[Any, ...] = ()
+    revision: int = 1
 
     states = 0
     grid = None
@@ -89,6 +100,10 @@ class VectorTask:
                 f"task {self.name}: settings = {self.settings!r}; only numbers, texts, true, false "
                 "and lists and tables of them can be kept with results"
             ) from error
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without `stepped_by`, which workers need not have: modules cannot be pickled."""
+        return {**self.__dict__, "stepped_by": ()}
 
     @property
     def start(self) -> np.ndarray:
@@ -120,6 +135,11 @@ class VectorTask:
     def display(self) -> Any:
         """How it is shown and played; None if it does not say."""
         return None if self.make_display is None else self.make_display(self)
+
+    @property
+    def code(self) -> tuple[Any, ...]:
+        """What decides its steps beside its digest; chance comes from NumPy's generators."""
+        return (self.make_stepper, *self.stepped_by, np)
 
     def dynamics(self) -> Dynamics:
         """Refused: it has no table of transitions.
@@ -171,6 +191,7 @@ class VectorTask:
         with closing(make_environment(name, **arguments)) as environment:
             _check_spaces(name, environment)
             announced, undoable = _announced(environment), can_undo(environment)
+            stepped_by = stepped_by_of(environment)
             limit = episode_limit
             if limit is None and environment.spec:
                 limit = environment.spec.max_episode_steps
@@ -191,6 +212,8 @@ class VectorTask:
             has_crash="crash" in announced,
             undoable=undoable,
             make_display=display_maker(environment),
+            stepped_by=stepped_by,
+            revision=REVISION,
         )
 
 

@@ -132,8 +132,8 @@ def tune(
         StoreError: if results cannot be written; finished cells stay.
     """
     _check(plan, floor, confidence)
-    with quiet(), open_store(folder, plan.experiment) as store:
-        store.write_values(plan.values)
+    with quiet(), open_store(folder, plan.experiment, plan.record) as store:
+        store.write_inputs(plan.values, plan.files)
         trials = Trials(plan, store, backend or ThisMachine(), report)
         verdicts, confidences = _decide(trials, floor, confidence)
         contenders = [
@@ -228,5 +228,5 @@ def _described(plan: Plan, tuning: Tuning) -> str:
     if tuning.choice is not None:
         assistant = tuning.choice.assistant
         facts["choice"] = tuning.choice.condition
-        facts["assistants"] = [{"name": assistant.name, **assistant.options._asdict()}]
+        facts["assistants"] = [{"name": assistant.name, **assistant.described()}]
     return tomli_w.dumps(facts)

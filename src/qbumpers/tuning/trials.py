@@ -21,12 +21,14 @@ class TuningProgress(NamedTuple):
         of: trials of the whole experiment, of which most will not be needed.
         steps: how many steps learners took in this run.
         damaged: files of an earlier run that were damaged; their trials are run again.
+        changed: why finished trials of an earlier run are simulated again, a sentence each.
     """
 
     trials: int
     of: int
     steps: int
     damaged: list[str]
+    changed: list[str]
 
 
 class Trials:
@@ -57,10 +59,11 @@ class Trials:
         self.fresh = dict.fromkeys(self.contents, 0)
         self._plan, self._store, self._backend, self._report = plan, store, backend, report
         self._means = {c: np.full((2 * self.length, 2), np.nan) for c in self.contents}
-        survey = store.survey(self.contents)
+        survey = store.survey(self.length)
         self._cells = survey.cells
         self._seconds = estimated_seconds(plan, [Cell(c, 0, 1) for c in self.contents])
-        self._progress = TuningProgress(0, self.length * len(self.contents), 0, survey.damaged)
+        of = self.length * len(self.contents)
+        self._progress = TuningProgress(0, of, 0, survey.damaged, survey.changed)
         report(self._progress)
 
     def race(self, contents: Collection[str], trials: int) -> None:

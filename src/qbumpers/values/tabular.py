@@ -232,7 +232,8 @@ def check_width(values: Any, actions: int, where: str) -> np.ndarray:
     row = np.array(values, np.float64)
     if row.shape != (actions,):
         raise RequestError(
-            f"Q values {where} have shape {row.shape}; one value an action, ({actions},), is needed"
+            f"Q values {where} have shape {row.shape}; one value per action, ({actions},), is "
+            "needed"
         )
     # The sum is finite only if every value is; it is ten times as fast to look at.
     if not math.isfinite(sum(row.tolist())) and not np.isfinite(row).all():

@@ -124,7 +124,7 @@ def test_a_single_trial_is_reported_too(tmp_path):
 def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
     found, results = load_archive(kept), load(landed)
     assert found.experiment == results.experiment
-    assert found.run["format"] == 2
+    assert found.run["format"] == 3
     trials = trial_measures(results.episodes, results.experiment.criterion)
     assert_frame_equal(found.trials, trials, rel_tol=1e-6, check_dtypes=False)
     curves = learning_curves(results.episodes, CHOSEN)
@@ -133,7 +133,7 @@ def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
     assert_frame_equal(found.curves.select(success.columns), success, rel_tol=1e-6)
     courses = override_courses(results.episodes, CHOSEN)
     assert_frame_equal(found.overrides, courses, rel_tol=1e-6)
-    again, before = find_tables(found.trials, found.experiment), find(results)
+    again, before = find_tables(found.trials, found.experiment, found.conditions), find(results)
     assert_frame_equal(again.summary, before.summary, rel_tol=1e-4)
     archived, fresh = (
         [claim.verdict for claim in experiment_claims(each, found.experiment)]

@@ -134,11 +134,7 @@ def _of_options(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
 ) -> Iterator[Drawing]:
     make = partial(_drawing, about.label)
-    options = {
-        option: None
-        for named in results.experiment.conditions()
-        for option in named.assistant.options._asdict()
-    }
+    options = dict.fromkeys(option for each in results.conditions for option in each.options)
     swept = sensitivity.sensitivities(about.summary, list(options))
     if swept.height:
         yield make(
