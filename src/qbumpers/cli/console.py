@@ -50,7 +50,7 @@ def print_warning(message: Warning | str, *_: Any) -> None:
 
 @contextlib.contextmanager
 def expert_warnings_printed() -> Generator[None, None, None]:
-    """Print warnings about action values that are no better than random play, a line each."""
+    """Print warnings about action values, a line each."""
     from qbumpers.experts import ExpertWarning
 
     with warnings.catch_warnings(record=True) as caught:

@@ -25,6 +25,16 @@ if TYPE_CHECKING:
 Check = Annotated[
     Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
 ]
+Convert = Annotated[
+    Path | None,
+    typer.Option(
+        help="Convert this DQN of Stable-Baselines3 in place of training.", metavar="MODEL.zip"
+    ),
+]
+Statistics = Annotated[
+    Path | None,
+    typer.Option(help="The file of VecNormalize that goes with --convert.", metavar="FILE.pkl"),
+]
 Figures = Annotated[
     Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
 ]
@@ -65,6 +75,8 @@ def expert(
         str, typer.Argument(help="Name of a task, or of a Gymnasium environment.", metavar="TASK")
     ],
     check: Check = None,
+    convert: Convert = None,
+    statistics: Statistics = None,
     figures: Figures = None,
     out: Out = None,
     corrected: Corrected = None,
@@ -84,6 +96,10 @@ def expert(
     equals, after 50 random actions at the beginning. If the task has no success, mean
     returns decide instead. Training that was stopped goes on with the seeds that are missing.
 
+    A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
+    observations, give the statistics too: its own file does not hold them. Such files can hold
+    code that runs when they are read: open none from strangers.
+
     Example: qbumpers expert lunar-lander --out expert.npz
     """
     from qbumpers.experts.selecting import make_recipe
@@ -92,6 +108,7 @@ def expert(
     made = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
+    _check_conversion(made, check, convert, statistics)
     path = out or Path(f"{task.replace('/', '-')}.npz")
     with stoppable():
         if made.states:
@@ -101,6 +118,8 @@ def expert(
             return
         if check is not None:
             _check(made, check, figures)
+        elif convert is not None:
+            _convert(made, convert, statistics, path)
         else:
             recipe = make_recipe(
                 made,
@@ -113,6 +132,37 @@ def expert(
             _train(made, recipe, list(range(seeds)), path)
         if corrected is not None:
             _correct(made, check or path, corrected)
+
+
+def _check_conversion(
+    task: Any, check: Path | None, convert: Path | None, statistics: Path | None
+) -> None:
+    if convert is None and statistics is not None:
+        raise RequestError(
+            f"--statistics {statistics}: they are of a model; give --convert FILE too"
+        )
+    if convert is not None and check is not None:
+        raise RequestError(
+            f"--convert {convert}: --check only looks at values; give one of the two"
+        )
+    if convert is not None and task.states:
+        raise RequestError(
+            f"--convert {convert}: task {task.name} has a table, it is solved exactly"
+        )
+
+
+def _convert(task: "Task", model: Path, statistics: Path | None, path: Path) -> None:
+    from qbumpers.experts import check_expert, from_stable_baselines
+
+    with expert_warnings_printed():
+        values = from_stable_baselines(model, task, statistics)
+        values.save(path)
+        found = check_expert(task, values)
+    OUTPUT.print(
+        f"{escape(values.method)}: mean return {found.expert.mean:.1f}, of random actions "
+        f"{found.random.mean:.1f}\nValues: [bold]{escape(str(path))}[/bold]",
+        soft_wrap=True,
+    )
 
 
 def _hidden(text: str) -> list[int]:

@@ -12,7 +12,7 @@ from qbumpers.values.tabular import QValues
 
 
 class ExpertWarning(UserWarning):
-    """The assistant's action values are no better than no values."""
+    """The assistant's action values are no better than none, or may not be the model's."""
 
 
 class MeanWithError(NamedTuple):

@@ -12,6 +12,7 @@ from gymnasium.wrappers import TimeLimit
 from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
+from qbumpers.tasks.agreement import check_agreement
 from qbumpers.tasks.checking import check_arrays, check_cells, check_common, normalised_rows
 from qbumpers.tasks.construction import (
     Judge,
@@ -34,8 +35,8 @@ from qbumpers.tasks.task import distance_between
 class TabularTask:
     """A finite episodic Markov decision process (Section 2.1); it is a `Task`.
 
-    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0. The
-    last four fields are optional; `dataclasses.replace` adds them to a task from any source.
+    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0.
+    Fields from `success` on are optional; `dataclasses.replace` adds them to any task.
 
     Attributes:
         name: for messages and files.
@@ -53,6 +54,8 @@ class TabularTask:
         no_op: the action that does nothing; -1 if there is none.
         action_distance: float [A, A], how far apart actions are; None if any two are alike.
         seen: int [S], number of what the assistant sees of each state, if it is less than all.
+        first_state: number that its environment gives to state 0; it counts on from there.
+        first_action: number that its environment gives to action 0.
         make_display: makes `display` of the task; no part of its digest.
 
     Raises:
@@ -74,6 +77,8 @@ class TabularTask:
     no_op: int = -1
     action_distance: np.ndarray | None = None
     seen: np.ndarray | None = None
+    first_state: int = 0
+    first_action: int = 0
     make_display: Callable[["TabularTask"], Any] | None = None
 
     observation_size = 0
@@ -105,8 +110,13 @@ class TabularTask:
 
     @property
     def observation_space(self) -> spaces.Discrete:
-        """The numbers of its states."""
-        return spaces.Discrete(self.states)
+        """The numbers of its states, as its environment counts them."""
+        return spaces.Discrete(self.states, start=self.first_state)
+
+    @property
+    def action_space(self) -> spaces.Discrete:
+        """The numbers of its actions, as its environment counts them."""
+        return spaces.Discrete(self.actions, start=self.first_action)
 
     @property
     def events(self) -> frozenset[str]:
@@ -281,6 +291,11 @@ class TabularTask:
     ) -> "TabularTask":
         """A task from a Gymnasium environment that has a transition table `P`.
 
+        Wrappers that only watch, and TransformReward and ClipReward, are followed. Then the table
+        is compared with steps of the environment, of a copy of it if it can be copied; see
+        `check_agreement`. States and actions are counted from 0 in the task, whatever number the
+        environment's spaces start with.
+
         Args:
             environment: for example `gymnasium.make("FrozenLake-v1")`.
             discount: in (0, 1]; Gymnasium's environments state none.
@@ -292,11 +307,17 @@ class TabularTask:
             The task.
 
         Raises:
-            RequestError: if the environment has no table, or no limit is known.
+            RequestError: if the environment has no table, no limit is known, it has a wrapper that
+                cannot be followed, or its spaces or steps are not those of the table.
         """
-        description = description_of(environment, episode_limit)
-        made = cls.from_table(**description, discount=discount, success=success, crash=crash)
-        return replace(made, make_display=display_maker(environment))
+        found = description_of(environment, episode_limit)
+        made = cls.from_table(**found.table, discount=discount, success=success, crash=crash)
+        numbered = replace(
+            made, first_state=found.first_state, first_action=found.first_action,
+            make_display=display_maker(environment),
+        )  # fmt: skip
+        check_agreement(numbered, environment.unwrapped, found.reward)
+        return numbered
 
 
 def _cumulative(probability: np.ndarray) -> np.ndarray:

@@ -47,7 +47,12 @@ class Task(Protocol):
 
     @property
     def observation_space(self) -> gymnasium.Space[Any]:
-        """Discrete(S), or Box of float32 [D]."""
+        """Discrete(S), with the environment's start, or Box of float32 [D]."""
+        ...
+
+    @property
+    def action_space(self) -> gymnasium.spaces.Discrete:
+        """Discrete(A), with the environment's start: elsewhere actions count from 0."""
         ...
 
     @property

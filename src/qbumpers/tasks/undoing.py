@@ -1,12 +1,13 @@
 """Taking a step of a Gymnasium environment back, through its wrappers."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 from gymnasium import wrappers
 
 from qbumpers.errors import RequestError
+from qbumpers.tasks.wrapping import layers
 
 # Nothing that they keep decides what later steps give, or it counts the step, which has happened.
 # Classes derived from these may keep something of their own, so each is named.
@@ -55,7 +56,7 @@ def undo_of(environment: gymnasium.Env[Any, Any]) -> tuple[Snapshot, Restore]:
         RequestError: if the environment lacks them, or a wrapper may keep something that would not
             be put back, and does not define both itself.
     """
-    for layer in layers_of(environment):
+    for layer in layers(environment):
         kind = type(layer)
         if hasattr(kind, "snapshot") and hasattr(kind, "restore"):
             undoing: Any = layer
@@ -94,14 +95,6 @@ def reached_limit(environment: gymnasium.Env[Any, Any]) -> bool:
     # Gymnasium has no public name for either number.
     return any(
         (layer._elapsed_steps or 0) >= layer._max_episode_steps
-        for layer in layers_of(environment)
+        for layer in layers(environment)
         if isinstance(layer, wrappers.TimeLimit)
     )
-
-
-def layers_of(environment: Any) -> Iterator[gymnasium.Env[Any, Any]]:
-    """The environment as it is given, and what it wraps, from the outside in."""
-    while isinstance(environment, gymnasium.Wrapper):
-        yield environment
-        environment = environment.env
-    yield environment
