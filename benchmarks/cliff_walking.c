@@ -1,7 +1,7 @@
 /* Cliff Walking's learner under Stochastic Q Bumpers as one plain loop: what a core can do.
 
    Tabular Q-learning with transition credit, alpha = 0.7, second-best overrides, escalation; 100
-   times an assisted episode and a greedy one without help in each trial.
+   times an assisted episode and a greedy unassisted one in each trial.
 
        cc -O3 -march=native cliff_walking.c -o cliff_walking -lm
        ./cliff_walking TRIALS SEED

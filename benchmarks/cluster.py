@@ -46,7 +46,7 @@ def a_cell(backend: Backend, plan: Plan, alone: bool) -> Timed:
 
 
 def a_sweep(backend: Backend, plan: Plan) -> Timed:
-    """Million steps a second of a whole run into a folder."""
+    """Million steps per second of a whole run into a folder."""
 
     def timed(_: int) -> float:
         steps: list[int] = []
@@ -94,7 +94,7 @@ def against_threads(cluster: RayCluster, plan: Plan, rounds: int) -> list[Row]:
 
 
 def measure(quick: bool) -> list[Row]:
-    """Every row of this benchmark; none where Ray is not installed."""
+    """Every row of this benchmark; none if Ray is not installed."""
     if importlib.util.find_spec("ray") is None:
         print("Ray is not installed: what it costs is left out.")
         return []

@@ -32,9 +32,9 @@ class Row(NamedTuple):
         name: what was measured.
         measured: the median over the rounds.
         unit: of `measured`.
-        baseline: what it is compared with, in words; empty where there is nothing.
-        ratios: measured to baseline, one a round.
-        target: what it should reach, where there is such a number.
+        baseline: what it is compared with, in words; empty if there is nothing.
+        ratios: measured to baseline, one per round.
+        target: what it should reach, if there is such a number.
     """
 
     name: str
@@ -46,14 +46,14 @@ class Row(NamedTuple):
 
 
 def alternate(timed: dict[str, Timed], rounds: int) -> dict[str, list[float]]:
-    """Measure everything once a round, in turn, so that a busy moment hits all alike.
+    """Measure everything once per round, in turn, so that a busy moment hits all alike.
 
     Args:
         timed: what to measure, by name.
         rounds: how often.
 
     Returns:
-        What each returned, by name, one number a round.
+        What each returned, by name, one number per round.
     """
     measured: dict[str, list[float]] = {name: [] for name in timed}
     for number in range(rounds):
@@ -70,10 +70,10 @@ def compared(
 
     Args:
         name: what was measured.
-        ours: one number a round.
+        ours: one number per round.
         unit: of both.
         baseline: what `theirs` is, in words.
-        theirs: one number a round.
+        theirs: one number per round.
         target: what `ours` should reach.
 
     Returns:

@@ -22,9 +22,9 @@ class Totals(NamedTuple):
     """What some trials add up to.
 
     Attributes:
-        steps: of all episodes, with help and without.
+        steps: of all episodes, assisted and unassisted.
         assisted_mean: return of an assisted episode.
-        unassisted_mean: return of a greedy episode without help.
+        unassisted_mean: return of a greedy unassisted episode.
     """
 
     steps: int
@@ -33,13 +33,13 @@ class Totals(NamedTuple):
 
 
 def run(assistant: Assistant, values: np.ndarray, trials: int, seed: int) -> Totals:
-    """Simulate people one after another.
+    """Simulate learners one after another.
 
     Args:
-        assistant: the assistant.
+        assistant: what decides about proposed actions.
         values: float64 [48, 4], Q* of the assistant.
-        trials: how many people.
-        seed: of the random numbers.
+        trials: how many learners.
+        seed: decides what learners and assistant draw.
 
     Returns:
         Steps and means.
@@ -83,7 +83,7 @@ def assisted_episode(
     rate: float,
     generator: np.random.Generator,
 ) -> tuple[float, int]:
-    """An episode with help, learned from; returns its return and length."""
+    """An assisted episode, learned from; returns its return and length."""
     state, earned, start_value = START, 0.0, float(values[START].max())
     for length in range(1, LIMIT + 1):
         if generator.random() < rate:
@@ -107,7 +107,7 @@ def assisted_episode(
 def greedy_episode(
     own_values: list[list[float]], generator: np.random.Generator
 ) -> tuple[float, int]:
-    """An episode without help, exploration or learning; returns its return and length."""
+    """An unassisted episode without exploration or learning; returns its return and length."""
     state, total = START, 0.0
     for length in range(1, LIMIT + 1):
         state, reward, ends = move(state, greedy(own_values[state], generator))

@@ -12,6 +12,8 @@ import sweeps
 import whole_processes
 from measuring import is_quick, show
 
+from qbumpers.simulation.cores import usable_cores
+
 BENCHMARKS = (simulation, shared_control, lander, deep, sweeps, cluster, whole_processes)
 
 
@@ -19,7 +21,7 @@ def main() -> None:
     quick = is_quick(__doc__)
     load = os.getloadavg()[0]
     rows = [row for benchmark in BENCHMARKS for row in benchmark.measure(quick)]
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f} when begun"
+    machine = f"{platform.machine()}, {usable_cores()} cores, load {load:.1f} when begun"
     show(f"Medians of alternated rounds ({machine})", rows)
 
 

@@ -19,7 +19,7 @@ UNIT = "us"
 
 
 def step_time(environment: gymnasium.Env[Any, Any], actions: list[int]) -> Timed:
-    """Microseconds a step, resets not counted.
+    """Microseconds per step, resets not counted.
 
     Args:
         environment: to be stepped through.

@@ -1,4 +1,4 @@
-"""Learner steps a second on one core, against a plain Python loop and a plain C loop.
+"""Learner steps per second on one core, against a plain Python loop and a plain C loop.
 
 Rates on one core are of processor time, which a busy machine disturbs less than the clock on the
 wall; those of two threads are of wall-clock time.
@@ -43,11 +43,11 @@ class Loops:
     def __init__(self, folder: Path) -> None:
         self.condition = condition_of(ASSISTANTS["stochastic-q-bumpers"])
         self.program = _compile(folder)
-        self.own_means: list[np.ndarray] = []  # a row a trial: assisted, unassisted
+        self.own_means: list[np.ndarray] = []  # a row per trial: assisted, unassisted
         self.other_means: dict[str, list[tuple[float, float]]] = {"Python": [], "C": []}
 
     def package(self, seed: int) -> float:
-        """Million steps a second of the package's compiled loops."""
+        """Million steps per second of the package's compiled loops."""
         begin = time.process_time()
         simulation = run(self.condition, trials=_TRIALS, seed=seed)
         seconds = time.process_time() - begin
@@ -57,7 +57,7 @@ class Loops:
         return simulation.steps / seconds / 1e6
 
     def python(self, seed: int) -> float:
-        """Million steps a second of the plain Python loop."""
+        """Million steps per second of the plain Python loop."""
         begin = time.process_time()
         totals = plain_python.run(
             self.condition.assistant, self.condition.values, _PYTHON_TRIALS, seed
@@ -67,7 +67,7 @@ class Loops:
         return totals.steps / seconds / 1e6
 
     def c(self, seed: int) -> float:
-        """Million steps a second of the plain C loop."""
+        """Million steps per second of the plain C loop."""
         answer = subprocess.run(
             [str(self.program), str(_TRIALS), str(seed)], capture_output=True, text=True, check=True
         )
@@ -76,7 +76,7 @@ class Loops:
         return steps / seconds / 1e6
 
     def check_agreement(self) -> None:
-        """Raise RuntimeError where the programs' means lie too far apart."""
+        """Raise RuntimeError if the programs' means lie too far apart."""
         own = np.concatenate(self.own_means)
         for name, trials in (("Python", _PYTHON_TRIALS), ("C", _TRIALS)):
             rounds = self.other_means[name]
@@ -111,7 +111,7 @@ def _compile(folder: Path) -> Path | None:
 
 
 def against_plain_loops(rounds: int) -> list[Row]:
-    """The package against the plain Python loop and, where it can be compiled, the C loop."""
+    """The package against the plain Python loop and, if it can be compiled, the C loop."""
     with tempfile.TemporaryDirectory() as folder:
         loops = Loops(Path(folder))
         timed: dict[str, Timed] = {"ours": loops.package, "Python": loops.python}
@@ -127,7 +127,7 @@ def against_plain_loops(rounds: int) -> list[Row]:
 
 
 def by_assistant(rounds: int) -> list[Row]:
-    """Each assistant's rate, in proportion to that without help."""
+    """Each assistant's rate, in proportion to that without an assistant."""
     rates = alternate(
         {name: _rate(condition_of(assistant)) for name, assistant in ASSISTANTS.items()}, rounds
     )

@@ -48,11 +48,11 @@ class Processes:
 
 
 def sweep(plan: Plan, backend: Backend, *, assembled: bool = True) -> Timed:
-    """Million steps a second of a run into a fresh folder.
+    """Million steps per second of a run into a fresh folder.
 
     Args:
         plan: the experiment.
-        backend: where it is run.
+        backend: what runs it.
         assembled: whether to time the whole call, with calibration before and tables of the whole
             experiment after; else from its first cell to the last that is kept.
     """
@@ -74,7 +74,7 @@ def sweep(plan: Plan, backend: Backend, *, assembled: bool = True) -> Timed:
 
 
 def engine(plan: Plan) -> Timed:
-    """Million steps a second of the same trials simulated on two threads, and thrown away."""
+    """Million steps per second of the same trials simulated on two threads, and thrown away."""
     trials = plan.experiment.trials
 
     def timed(_: int) -> float:

@@ -21,7 +21,7 @@ def command_time(*arguments: str, cache: Path | None = None) -> float:
 
     Args:
         *arguments: of the interpreter.
-        cache: where compiled code is kept; the usual place where None.
+        cache: where compiled code is kept; the usual place if None.
 
     Returns:
         From its start to its end, on the wall clock.
@@ -63,7 +63,7 @@ def reproducing_cold() -> Row:
     with tempfile.TemporaryDirectory() as folder:
         cache = Path(folder)
         cold = reproduction_time(cache)
-        if not any(cache.rglob("*.nbi")):
+        if not any(cache.rglob("*.nbc")):
             raise RuntimeError(f"no compiled code in {cache}: the run was not cold")
         idle = command_time("-c", _LIBRARIES)
     return compared("reproduce, cold", [cold], UNIT, _LIBRARIES, [idle], Target(60))
@@ -96,7 +96,7 @@ def _starting(code: str) -> Timed:
 
 
 def measure(quick: bool) -> list[Row]:
-    """Every row of this benchmark; the cold run takes up to a minute, so not where quick."""
+    """Every row of this benchmark; the cold run takes up to a minute, so not if quick."""
     imports, processes = (3, 1) if quick else (15, 5)
     rows = [importing(imports), figure_2(imports), reproducing(processes)]
     return rows if quick else [*rows, reproducing_cold()]

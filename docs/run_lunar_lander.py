@@ -13,8 +13,9 @@ import tomli_w
 
 from qbumpers import make_task
 from qbumpers.experts.choosing import best, judge
+from qbumpers.experts.loading import load_network
 from qbumpers.reproduction.experiments import profiles, reproduction
-from qbumpers.values import NetworkValues, load_values
+from qbumpers.values import NetworkValues
 
 TASK = "lunar-lander"
 MAIN, SECOND, CORRECTED = "full", "second-expert", "corrected-values"
@@ -50,9 +51,11 @@ def main() -> None:
 
 def second_best(expert: Path) -> NetworkValues:
     """The expert that would have been kept if the best had not been trained."""
-    kept, task = load_values(expert), make_task(TASK)
+    task = make_task(TASK)
+    kept = load_network(task, expert)
     paths = sorted(expert.with_name(f"{expert.name}.work").iterdir())
-    others = [v for v in map(load_values, paths) if v.digest() != kept.digest()]
+    trained = [load_network(task, path) for path in paths]
+    others = [values for values in trained if values.digest() != kept.digest()]
     return others[best([judge(task, values) for values in others])]
 
 

@@ -29,7 +29,7 @@ def template(name: str, *more: Callable[..., str]) -> jinja2.Template:
 
 
 def number(value: float | None, digits: int = 1) -> str:
-    """A number for the page; a dash where there is none."""
+    """A number for the page; a dash if there is none."""
     if value is None or not np.isfinite(value):
         return "–"
     return f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
@@ -49,7 +49,7 @@ def estimate(value: IntervalEstimate, digits: int = 1) -> str:
 
 
 def with_error(value: Any, digits: int = 1) -> str:
-    """A mean with 1.96 of its standard error; a dash where there is none."""
+    """A mean with 1.96 of its standard error; a dash if there is none."""
     if value is None or not np.isfinite(value.mean):
         return number(None)
     return f"{number(value.mean, digits)}{PLUS_MINUS}{number(1.96 * value.error, digits)}"

@@ -1,7 +1,7 @@
-"""Land on the moon with somebody who presses keys at random, and keep the pictures.
+"""Land on the moon with an agent that acts at random, and save the pictures.
 
-The expert that ships with the package lends a hand, in three ways; each landing becomes an
-animation in the current folder, framed in red where the assistant takes over. Needs the extra
+The expert that ships with the package assists it in three ways; each landing becomes an
+animation in the current folder, framed in red when the assistant takes over. Needs the extra
 `lunar` (in a checkout, `pip install -e ".[lunar]"`). Takes a few seconds.
 """
 
@@ -13,7 +13,7 @@ from PIL import Image, ImageOps
 import qbumpers
 from qbumpers.values import shipped_expert
 
-EVERY = 5  # steps from one picture to the next, of the 50 a second
+EVERY = 5  # steps from one picture to the next, of the 50 per second
 WIDTH, HEIGHT, FRAME = 300, 200, 4  # of a picture, in pixels
 
 ASSISTANTS = {

@@ -34,7 +34,7 @@ def report(moment: str, learner: DQN, environment: gymnasium.Env) -> None:
         summaries.append(info["assisted_episode"])
     mean_return = np.mean([summary["return"] for summary in summaries])
     overrides = np.mean([summary["overrides"] for summary in summaries])
-    print(f"{moment}: mean return {mean_return:.1f}, {overrides:.1f} overrides an episode")
+    print(f"{moment}: mean return {mean_return:.1f}, {overrides:.1f} overrides per episode")
 
 
 def main() -> None:

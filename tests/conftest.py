@@ -15,13 +15,27 @@ settings.register_profile("qbumpers", deadline=None, derandomize=True)
 settings.load_profile("qbumpers")
 
 
-@pytest.fixture
+def _registries_of_its_own(monkeypatch):
+    for module, names in (
+        (registry, ("_rules", "_rules_by_options")),
+        (learners, ("_learners", "_learners_by_settings")),
+    ):
+        for name in names:
+            monkeypatch.setattr(module, name, dict(getattr(module, name)))
+
+
+@pytest.fixture(autouse=True)
 def own_registry(monkeypatch):
     """Rules and learners registered by a test are forgotten when it ends."""
-    monkeypatch.setattr(registry, "_rules", dict(registry._rules))
-    monkeypatch.setattr(registry, "_rules_by_options", dict(registry._rules_by_options))
-    for name in ("_learners", "_learners_by_settings"):
-        monkeypatch.setattr(learners, name, dict(getattr(learners, name)))
+    _registries_of_its_own(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def own_registry_of_module():
+    """Rules and learners registered by a test module are forgotten when it ends."""
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        _registries_of_its_own(monkeypatch)
+        yield
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 # Wide, so that tables and messages are not broken into lines; plain, so that they are text.
 ENVIRONMENT = {**os.environ, "COLUMNS": "200", "TERM": "dumb", "NO_COLOR": "1"}
 
-# `python -m qbumpers` that hears Ctrl-C even where it is started by a background job, which does
+# `python -m qbumpers` that hears Ctrl-C even if it is started by a background job, which does
 # not, and that can be forbidden to write large files.
 PROGRAM = """
 import runpy, signal, sys
@@ -32,7 +32,7 @@ def start(*arguments, largest_file=0):
 
 
 def finish(process):
-    """Wait for a process, kill it where it hangs; its exit status, output and errors."""
+    """Wait for a process, kill it if it hangs; its exit status, output and errors."""
     try:
         output, errors = process.communicate(timeout=300)
     finally:

@@ -1,6 +1,7 @@
 """Rules a second time: plain Python, written from Algorithm 1 and Section 4 of the paper."""
 
 import collections
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ class PlainRule:
 class PlainBudget:
     """Another rule, until it has overridden so often in one episode."""
 
-    def __init__(self, of, per_episode):
+    def __init__(self, of: dict[str, Any], per_episode: int):
         self.of, self.per_episode = plain_rule(**of), per_episode
         self.spent = collections.Counter()
 
@@ -116,6 +117,21 @@ class PlainBudget:
         self.spent[step.episode] += step.executed != step.proposed or step.undone
 
 
+class PlainSigns:
+    """An own rule of the tests: half of its actions follow from the states that it is told."""
+
+    def __init__(self):
+        self.told = 0
+
+    def decide(self, situation, noise):
+        action = (situation.state + self.told) % len(situation.values)
+        return (action if noise.coin < 0.5 else situation.proposed), 0.5
+
+    def observe(self, step):
+        self.told = 3 * step.state + 5 * step.next_state
+
+
 def plain_rule(name, **options):
     """The plain form of an assistant, as a file would describe it."""
-    return PlainBudget(**options) if name == "budget" else PlainRule(name, **options)
+    with_memory = {"budget": PlainBudget, "signs": PlainSigns}
+    return with_memory[name](**options) if name in with_memory else PlainRule(name, **options)

@@ -8,6 +8,7 @@ and the names of conditions.
 import hashlib
 import json
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class _Words(np.random.bit_generator.ISeedSequence):
     def __init__(self, words):
         self.words = words
 
-    def generate_state(self, n_words, dtype=np.uint32):
+    def generate_state(self, n_words: int, dtype: Any = np.uint32) -> np.ndarray:
         assert (n_words, dtype) == (len(self.words), np.uint64)
         return self.words
 
@@ -48,7 +49,8 @@ def _seed_sequence(seed, content):
 
 def _four(drawn):
     state = drawn[-12:]
-    return [np.random.SFC64(_Words(state[first : first + 3])) for first in (0, 3, 6, 9)]
+    seeds: list[Any] = [_Words(state[first : first + 3]) for first in (0, 3, 6, 9)]
+    return [np.random.SFC64(words) for words in seeds]
 
 
 def scheduled(schedule, episode, episodes):
@@ -91,7 +93,7 @@ def learned_from(perception, proposed, executed, undone, reward, coin):
 
 
 def draw_index(probabilities, generator):
-    """Index of the outcome that happens; nothing is drawn where there is but one."""
+    """Index of the outcome that happens; nothing is drawn if there is but one."""
     if len(probabilities) == 1:
         return 0
     chance, sum_so_far = generator.random(), 0.0
@@ -137,9 +139,9 @@ class ReferenceTrial:
                 self.draw_from(bit_generators_of_episode(self.seed, common, self.trial, episode))
             if episode > 0:
                 self.forget(self.condition.forgetting)
-            helped = episode < self.condition.episodes
-            assisted = self.training_episode(episode, helped)
-            unassisted = self.greedy_episode(helped)
+            is_assisted = episode < self.condition.episodes
+            assisted = self.training_episode(episode, is_assisted)
+            unassisted = self.greedy_episode(is_assisted)
             self.episodes.append(
                 {f"assisted_{name}": value for name, value in assisted.items()}
                 | {f"unassisted_{name}": value for name, value in unassisted.items()}
@@ -166,6 +168,10 @@ class ReferenceTrial:
         events = 1 * ends + 2 * bool(succeeds) + 4 * bool(crashes)
         next_state = int(task.next_state[place][index])
         return next_state, float(task.reward[place][index]), ends, events
+
+    def seen(self, state):
+        """What the assistant sees of a state."""
+        return state if self.task.seen is None else int(self.task.seen[state])
 
     def greedy_episode(self, counted):
         state, total, length, events, ended = self.first_state(self.greedy), 0.0, 0, 0, False
@@ -203,13 +209,13 @@ class ReferenceTrial:
             return self.ahead[1]
         return self.explored(state, epsilon)
 
-    def decided(self, situation, noise, helped):
+    def decided(self, situation, noise, is_assisted):
         """(executed, probability, undone)."""
-        if not helped:
+        if not is_assisted:
             return situation.proposed, 0.0, False
         return (*self.rule(situation, noise), False)[:3]
 
-    def training_episode(self, episode, helped):
+    def training_episode(self, episode, is_assisted):
         epsilon = scheduled(self.learner.epsilon, episode, self.condition.episodes)
         rate = scheduled(self.learner.learning_rate, episode, self.condition.episodes)
         state, self.ahead = self.first_state(self.nature), None
@@ -221,11 +227,12 @@ class ReferenceTrial:
             proposed = self.hand(self.mean(state, epsilon), last, self.explore)
             noise = Noise(self.noise.random(), self.noise.random())
             situation = Situation(
-                state=state, values=np.array(values), others=self.condition.others[state],
-                proposed=proposed, earned=earned, discount=discount, start_value=start_value,
-                episode=episode, step=len(self.steps) - first_step,
+                state=self.seen(state), values=np.array(values),
+                others=self.condition.others[state], proposed=proposed, earned=earned,
+                discount=discount, start_value=start_value, episode=episode,
+                step=len(self.steps) - first_step,
             )  # fmt: skip
-            executed, probability, undone = self.decided(situation, noise, helped)
+            executed, probability, undone = self.decided(situation, noise, is_assisted)
             next_state, reward, would_end, happened = self.outcome(state, executed, self.nature)
             ended = would_end and not undone
             happened -= would_end - ended
@@ -242,9 +249,9 @@ class ReferenceTrial:
                 projected_return=earned + discount * values[proposed], reward=reward,
             )  # fmt: skip
             self.steps.append(step)
-            if self.observe and helped:
-                self.observe(step)
-            self.counts["assisted"][state] += helped
+            if self.observe and is_assisted:
+                self.observe(self.as_seen(step))
+            self.counts["assisted"][state] += is_assisted
             self.counts["overridden"][state] += step.overridden
             earned = earned + discount * reward
             discount = discount * self.condition.discount
@@ -257,6 +264,11 @@ class ReferenceTrial:
             "events": events,
             "overrides": sum(step.overridden for step in steps),
         }
+
+    def as_seen(self, step):
+        """A step as the assistant's rule is shown it."""
+        seen = {name: self.seen(getattr(step, name)) for name in ("state", "next_state")}
+        return SimpleNamespace(**{**vars(step), **seen})
 
     def learn(
         self, state, proposed, executed, undone, reward, next_state, would_end, epsilon, rate

@@ -48,21 +48,21 @@ def plain(returned: Any) -> Any:
     return returned.tolist() if isinstance(returned, np.ndarray | np.generic) else returned
 
 
-class Dial(gymnasium.Env[np.ndarray, int]):
-    """Actions 5, 6 and 7, an array as observation; remembers what it was told to do."""
+class Dial(gymnasium.Env[np.ndarray, np.int64]):
+    """Actions 5, 6 and 7, an array as observation; remembers what it was asked to do."""
 
     observation_space = gymnasium.spaces.Box(-1.0, 1.0, (2,))
     action_space = gymnasium.spaces.Discrete(3, start=5)
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        self.told: list[int] = []
+        self.asked: list[int] = []
         self.options = options
         return np.zeros(2, np.float32), {"temperature": 20}
 
     def step(self, action):
-        self.told.append(action)
-        return np.full(2, 0.5, np.float32), 1.0, len(self.told) == 4, False, {"temperature": 21}
+        self.asked.append(int(action))
+        return np.full(2, 0.5, np.float32), 1.0, len(self.asked) == 4, False, {"temperature": 21}
 
 
 def ladder() -> TabularEnvironment:

@@ -8,15 +8,18 @@ from pathlib import Path
 
 import pytest
 
+from tests.narrowing import present
+
 FOLDER = Path(__file__).parent.parent / "benchmarks"
 RATIO = re.compile(r"[\d.,]+ \([\d.,]+\.\.[\d.,]+\)")
 
 
 @pytest.fixture(scope="module")
 def measuring():
-    specification = importlib.util.spec_from_file_location("measuring", FOLDER / "measuring.py")
+    path = FOLDER / "measuring.py"
+    specification = present(importlib.util.spec_from_file_location("measuring", path))
     module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
+    present(specification.loader).exec_module(module)
     return module
 
 

@@ -33,7 +33,10 @@ OPTIONS = {
     "maximal": {},
     "local-q-thresholding": {"alpha": 0.4, "second": True},
     "stochastic-q-bumpers": {"alpha": 0.6, "v_min": -10.0},
-    "budget": {"per_episode": 3, "of": {"name": "stochastic-q-bumpers", "alpha": 0.2}},
+    "budget": {
+        "per_episode": 3,
+        "of": {"name": "stochastic-q-bumpers", "alpha": 0.2, "v_min": -10.0},
+    },
 }
 OF_STATES = [name for name, learner in learners().items() if learner.observes == "states"]
 

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qbumpers.compilation import compiled_for_session
 from qbumpers.decisions import (
     Account,
     Decision,
     Execution,
     Noise,
     begin,
-    checked_action,
+    execution_of,
     projected_return,
     settle,
     situate,
@@ -52,8 +53,8 @@ def test_a_situation_holds_the_account_as_it_stands():
     assert situation.values is row
     assert situation.others is others
     assert (situation.state, situation.proposed) == (17, 1)
-    told = [getattr(situation, field) for field in Account._fields]
-    assert told == [-3.0, 0.5, 9.0, 2, 4]
+    seen = [getattr(situation, field) for field in Account._fields]
+    assert seen == [-3.0, 0.5, 9.0, 2, 4]
 
 
 @pytest.mark.parametrize(
@@ -74,10 +75,30 @@ def test_a_step_is_overridden_if_another_action_was_executed_or_it_was_undone(
     assert (step.coin, step.tie, step.reward, step.credited) == (0.25, 0.75, -1.0, 1)
 
 
-@pytest.mark.parametrize("action", [-1, 3, 10**9])
-def test_an_action_that_there_is_not_is_refused(action):
-    with pytest.raises(RequestError, match="outside the action space"):
-        checked_action(action, 3)
+execution_in_compiled_code = compiled_for_session(lambda *given: execution_of(*given))
+
+
+@pytest.mark.parametrize("execute", [execution_of, execution_in_compiled_code])
+@pytest.mark.parametrize("action", [-1, 3, 10**9, 1.5, -0.5, np.nan, np.inf])
+def test_an_action_that_there_is_not_is_refused(execute, action):
+    with pytest.raises(RequestError, match=r"whole number in \[0, number of actions\)"):
+        execute(Decision(action, 0.5, False), False, 3)
+
+
+@pytest.mark.parametrize("execute", [execution_of, execution_in_compiled_code])
+@pytest.mark.parametrize("probability", [2.0, 1 + 1e-15, -1e-300, np.nan, -np.inf])
+def test_a_probability_outside_0_and_1_is_refused(execute, probability):
+    with pytest.raises(RequestError, match=r"does not lie in \[0, 1\]"):
+        execute(Decision(1, probability, False), False, 3)
+
+
+@pytest.mark.parametrize("execute", [execution_of, execution_in_compiled_code])
+@pytest.mark.parametrize("probability", [0.0, 0.25, 1.0])
+@pytest.mark.parametrize("action", [0, 2, np.int64(1), 2.0])
+def test_what_can_be_done_is_executed(execute, action, probability):
+    found = execute(Decision(action, probability, False), True, 3)
+    assert found == (action, True, probability)
+    assert isinstance(found.executed, int)
 
 
 def test_a_rule_may_leave_undo_out():

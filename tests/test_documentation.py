@@ -28,6 +28,7 @@ from PIL import Image
 import qbumpers
 from qbumpers.cli import application
 from qbumpers.experiments.sources import load_experiment
+from tests.narrowing import present
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -247,7 +248,7 @@ def test_the_contributors_page_shows_the_layers_and_the_folders_that_there_are()
 
 def test_every_command_is_shown_somewhere():
     shown = {c[1] for p in PAGES.values() for c in commands_of(blocks_of(p)) if is_run(c)}
-    registered = {c.name or c.callback.__name__ for c in application.registered_commands}
+    registered = {c.name or present(c.callback).__name__ for c in application.registered_commands}
     assert registered <= shown
 
 
@@ -282,7 +283,7 @@ def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
 
 
 def rewrite(page):
-    """Write what blocks print into the `text` blocks after them, but where those have `...`."""
+    """Write what blocks print into the `text` blocks after them, unless those have `...`."""
     text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         for shown, _, printed in reversed(shown_and_printed(page, Path(folder))):

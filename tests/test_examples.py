@@ -19,8 +19,8 @@ PRINTED = {
         r"maximal: landed after \d+ steps, return \d+\.\d, \d+ overrides; see \S+\.gif\n"
     ),
     "train_inside_with_stable_baselines3.py": (
-        r"before training: mean return -?\d+\.\d, \d+\.\d overrides an episode\n"
-        r"after training: mean return -?\d+\.\d, \d+\.\d overrides an episode\n"
+        r"before training: mean return -?\d+\.\d, \d+\.\d overrides per episode\n"
+        r"after training: mean return -?\d+\.\d, \d+\.\d overrides per episode\n"
     ),
 }
 

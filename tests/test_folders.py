@@ -5,6 +5,7 @@ import threading
 import filelock
 import fsspec
 import pytest
+from fsspec.implementations.memory import MemoryFileSystem
 
 from qbumpers.errors import RequestError
 from qbumpers.files import StoreError, local_copy, open_folder
@@ -124,6 +125,6 @@ def test_a_failing_object_store_is_named(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise RuntimeError("no route")
 
-    monkeypatch.setattr(fsspec.implementations.memory.MemoryFileSystem, "pipe_file", fail)
+    monkeypatch.setattr(MemoryFileSystem, "pipe_file", fail)
     with pytest.raises(StoreError, match=r"failing/a\.txt: RuntimeError: no route"):
         folder.write("a.txt", b"")

@@ -1,6 +1,6 @@
 """What `import qbumpers` gives, and what it leaves for later."""
 
-import importlib
+import importlib.util
 import subprocess
 import sys
 
@@ -47,5 +47,6 @@ def test_all_public_names_come_with_a_star():
 
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match=r"qbumpers.*bumpers"):
-        qbumpers.bumpers  # noqa: B018 - reading it is the test
+        # Reading it is the test.
+        qbumpers.bumpers  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
     assert not hasattr(qbumpers, "simulator")

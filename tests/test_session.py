@@ -10,6 +10,7 @@ from qbumpers.simulation import record
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.dynamics import LIMIT, SUCCESS, TERMINATED, TRUNCATED
 from tests.assistants.own_rules import ABOVE_THE_GOAL, NoOptions, never_arrive
+from tests.narrowing import present
 from tests.shared_control_examples import CLIFF, DOWN, RIGHT, UP, bumpers, walking
 from tests.simulation.conditions import BUMPERS, on_the_cliff, taken_back
 
@@ -68,12 +69,12 @@ def test_a_session_keeps_the_records_of_the_wrapper(perceived):
         while not ended:
             proposed = int(generator.integers(4))
             _, reward, terminated, truncated, info = environment.step(proposed)
-            told = Step(**info["assistance"])
-            decision = session.decide(proposed, Noise(told.coin, told.tie))
-            assert (decision.action, decision.probability) == (told.executed, told.probability)
-            step = session.record(reward, told.next_state, told.events)
+            shown = Step(**info["assistance"])
+            decision = session.decide(proposed, Noise(shown.coin, shown.tie))
+            assert (decision.action, decision.probability) == (shown.executed, shown.probability)
+            step = session.record(reward, shown.next_state, shown.events)
             # The wrapper was reset once more, before the first of these episodes.
-            assert_equal_steps(step._replace(episode=step.episode + 1), told)
+            assert_equal_steps(step._replace(episode=step.episode + 1), shown)
             overridden += step.overridden
             ended = terminated or truncated
             assert (session.values_now is None) == ended
@@ -173,7 +174,7 @@ def test_an_undone_step_counts_and_ends_nothing(own_registry, perceived, credite
     assert step.credited == credited
     assert session.state == ABOVE_THE_GOAL
     assert (session.account.step, session.account.earned) == (13, -12.0 + 99.0)
-    assert session.values_now.tolist() == CLIFF(ABOVE_THE_GOAL).tolist()
+    assert present(session.values_now).tolist() == CLIFF(ABOVE_THE_GOAL).tolist()
     session.decide(UP, HALF)
     assert session.record(-1.0, 23, 0).projected_return == 87.0 + CLIFF(ABOVE_THE_GOAL)[UP]
 
@@ -225,7 +226,7 @@ def test_rules_cannot_change_the_values():
     session = bumpers_session()
     session.begin(START)
     with pytest.raises(ValueError, match="read-only"):
-        session.values_now[0] = 5.0
+        present(session.values_now)[0] = 5.0
 
 
 SEEDS, NUMBERS = range(4), range(2500)

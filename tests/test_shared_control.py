@@ -8,6 +8,7 @@ import pytest
 from qbumpers import SharedControl, make_task, register_assistant, solve
 from qbumpers.tasks import TabularEnvironment
 from tests.assistants.own_rules import BudgetOptions, full_budget, guide_within_budget, spend
+from tests.narrowing import of_kind
 from tests.shared_control_examples import (
     DOWN,
     LADDER,
@@ -212,7 +213,7 @@ def test_actions_need_not_start_at_0_nor_observations_be_numbers():
     assert [record[key] for key in ("proposed", "executed", "credited")] == [5, 7, 5]
     assert record["projected_return"] == 1.0
     environment.step(7)
-    assert environment.unwrapped.told == [7, 7]
+    assert of_kind(Dial, environment.unwrapped).asked == [7, 7]
     assert seen == [[0.0, 0.0], [0.5, 0.5], [0.5, 0.5]]
 
 

@@ -47,7 +47,7 @@ def test_a_time_limit_outside_cuts_the_episode_off():
 
 
 def test_a_changed_reward_inside_is_what_the_assistant_counts():
-    inside = climbing(wrappers.TransformReward(ladder(), lambda reward: 10 * reward))
+    inside = climbing(wrappers.TransformReward(ladder(), lambda reward: 10 * float(reward)))
     returned = play(inside, [0, 1, 1])
     assert [step[1] for step in returned[1:]] == [-30.0, 20.0, 20.0]
     second = returned[2][-1]["assistance"]
@@ -57,7 +57,7 @@ def test_a_changed_reward_inside_is_what_the_assistant_counts():
 
 
 def test_a_changed_reward_outside_is_none_of_the_assistants_business():
-    outside = wrappers.TransformReward(climbing(ladder()), lambda reward: 10 * reward)
+    outside = wrappers.TransformReward(climbing(ladder()), lambda reward: 10 * float(reward))
     returned = play(outside, [0, 1, 1])
     assert [step[1] for step in returned[1:]] == [-30.0, 20.0, 20.0]
     second = returned[2][-1]["assistance"]
@@ -161,8 +161,7 @@ def test_statistics_of_a_vector_count_assisted_episodes():
     )
     vector = wrappers.vector.RecordEpisodeStatistics(vector)
     vector.reset(seed=0)
-    for _ in range(13):
-        *_, infos = vector.step(np.array([LEFT, RIGHT]))
+    *_, infos = [vector.step(np.array([LEFT, RIGHT])) for _ in range(13)][-1]
     assert infos["episode"]["r"].tolist() == [87.0, 87.0]
     assert infos["assisted_episode"]["overrides"].tolist() == [13, 2]
     vector.close()

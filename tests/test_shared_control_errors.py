@@ -4,9 +4,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from gymnasium.wrappers import TransformReward
 
 from qbumpers import RequestError, SharedControl, TabularValues, make_assistant
-from tests.shared_control_examples import CLIFF, LEFT, Dial, bumpers, walking
+from qbumpers.assistants import register_assistant
+from qbumpers.decisions import Decision
+from tests.assistants.own_rules import NoOptions
+from tests.shared_control_examples import CLIFF, LEFT, UP, Dial, bumpers, walking
 
 
 def test_an_action_space_without_numbered_actions_is_refused():
@@ -135,6 +139,54 @@ def test_an_action_out_of_a_range_that_starts_later_is_refused(action):
     environment.reset()
     with pytest.raises(RequestError, match=rf"action = {action}; it must lie in \[5, 8\)"):
         environment.step(action)
+
+
+@pytest.mark.parametrize("action", [1.9, 1.0, np.float32(1), "1", None, [1], np.array([1])])
+def test_an_action_that_is_not_a_whole_number_is_refused(action):
+    environment = walking("none")
+    environment.reset(seed=0)
+    with pytest.raises(RequestError, match=r"action = .*; a whole number in \[0, 4\) is needed"):
+        environment.step(action)
+
+
+@pytest.mark.parametrize("action", [1, np.int64(1), np.uint8(1), np.array(1), True])
+def test_whole_numbers_of_any_kind_are_actions(action):
+    environment = walking("none")
+    environment.reset(seed=0)
+    assert environment.step(action)[4]["assistance"]["executed"] == 1
+
+
+@pytest.mark.parametrize("reward", [np.nan, np.inf, -np.inf])
+def test_a_reward_that_is_not_finite_is_refused_and_the_episode_is_over(reward):
+    environment = walking(**bumpers())
+    environment.reset(seed=0)
+    environment.step(UP)
+    inner = environment.env
+    environment.env = TransformReward(inner, lambda _: reward)
+    with pytest.raises(RequestError, match=rf"reward = {reward} of step 2; it must be finite"):
+        environment.step(UP)
+    environment.env = inner
+    with pytest.raises(ResetNeeded):
+        environment.step(UP)
+    environment.reset()
+    environment.step(UP)
+
+
+@pytest.mark.parametrize(
+    ("decision", "what"),
+    [
+        (Decision(1.5, 0.0), r"Decision\(action=1\.5.*whole number"),  # type: ignore[arg-type]
+        (Decision(4, 0.0), r"Decision\(action=4.*whole number"),
+        (Decision(1, 2.0), r".*probability=2\.0.*probability of an override"),
+        (Decision(1, np.nan), r".*probability=nan.*probability of an override"),
+    ],
+)
+def test_a_decision_that_cannot_be_executed_names_the_rule(decision, what):
+    register_assistant("odd", NoOptions)(lambda situation, noise, options: decision)
+    environment = walking("odd")
+    environment.reset(seed=0)
+    with pytest.raises(RequestError, match=f"assistant odd: {what}"):
+        environment.step(UP)
 
 
 def test_a_refused_action_is_no_step():

@@ -1,11 +1,14 @@
 """Arrays that cost nothing in a compiled loop.
 
-Numba counts references to arrays, atomically, even where a loop only reads an element; and the
+Numba counts references to arrays, atomically, even if a loop only reads an element; and the
 length of `table[state]` is known only at run time. Arrays borrowed here are not counted, and rows
 have a length known to the compiler, which then unrolls every loop over actions. Together they make
 the simulation several times as fast. Whoever borrows must hold the array until the loop is over.
+
+What rules and learners are given to read is read-only, which in compiled code is a matter of types.
 """
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -77,16 +80,52 @@ def _used(typing_context: Any, arrays: Any) -> Any:
     return types.none(arrays), generate
 
 
-def row(table: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
-    """A borrowed row of a table; it must not outlive the table.
+def read_only(arrays: Any) -> Any:
+    """The same arrays, which whoever gets them cannot change.
 
     Args:
-        table: float64 [S, A], C-contiguous.
+        arrays: an array; in Python also a NamedTuple or tuple of arrays and numbers, or None.
+
+    Returns:
+        Views of the arrays.
+    """
+    if isinstance(arrays, np.ndarray):
+        view = arrays.view()
+        view.flags.writeable = False
+        return view
+    if isinstance(arrays, tuple):
+        parts: Any = map(read_only, arrays)
+        make = getattr(arrays, "_make", tuple)
+        return make(parts)
+    return arrays
+
+
+@overload(read_only, strict=False, jit_options=INLINE)
+def _compiled_read_only(arrays: Any) -> Any:
+    typed: Any = _typed_read_only
+    return lambda arrays: typed(arrays)
+
+
+@intrinsic
+def _typed_read_only(typing_context: Any, arrays: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if context.enable_nrt:
+            context.nrt.incref(builder, arrays, arguments[0])
+        return arguments[0]
+
+    return arrays.copy(readonly=True)(arrays), generate
+
+
+def row(table: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
+    """What a table has at an index, borrowed; it must not outlive the table.
+
+    Args:
+        table: float64 [S, A] or [S, K, A], C-contiguous.
         index: in [0, S); not checked, not wrapped.
         width: any tuple of A integers; its length tells the compiler A.
 
     Returns:
-        The view [A].
+        The view [A] or [K, A].
     """
     return table[index]
 
@@ -99,67 +138,26 @@ def _compiled_row(table: Any, index: Any, width: Any) -> Any:
 
 @intrinsic
 def _borrowed(typing_context: Any, table: Any, index: Any, width: Any) -> Any:
-    row_type = types.Array(table.dtype, 1, "C")
+    row_type = types.Array(table.dtype, table.ndim - 1, "C", readonly=not table.mutable)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         source = arrayobj.make_array(table)(context, builder, arguments[0])
         integer = context.get_value_type(types.intp)
-        size = context.get_abi_sizeof(context.get_data_type(table.dtype))
-        length = integer(width.count)
+        size = integer(context.get_abi_sizeof(context.get_data_type(table.dtype)))
+        inner = [builder.extract_value(source.shape, axis) for axis in range(1, table.ndim - 1)]
+        shape, strides = [*inner, integer(width.count)], [size]
+        for length in reversed(shape[1:]):
+            strides.insert(0, builder.mul(strides[0], length))
+        first = functools.reduce(builder.mul, shape, arguments[1])
         view: Any = arrayobj.make_array(row_type)(context, builder)
         arrayobj.populate_array(
             view,
-            data=builder.gep(source.data, [builder.mul(arguments[1], length)], inbounds=True),
-            shape=cgutils.pack_array(builder, [length]),
-            strides=cgutils.pack_array(builder, [integer(size)]),
-            itemsize=integer(size),
+            data=builder.gep(source.data, [first], inbounds=True),
+            shape=cgutils.pack_array(builder, shape),
+            strides=cgutils.pack_array(builder, strides),
+            itemsize=size,
             meminfo=None,
         )
         return view._getvalue()
 
     return row_type(table, types.intp, width), generate
-
-
-def rows(tables: np.ndarray, index: int, width: tuple[int, ...]) -> np.ndarray:
-    """Borrowed rows of several tables; they must not outlive the tables.
-
-    Args:
-        tables: float64 [S, K, A], C-contiguous.
-        index: in [0, S); not checked, not wrapped.
-        width: any tuple of A integers; its length tells the compiler A.
-
-    Returns:
-        The view [K, A].
-    """
-    return tables[index]
-
-
-@overload(rows, strict=False, jit_options=INLINE)
-def _compiled_rows(tables: Any, index: Any, width: Any) -> Any:
-    borrowed: Any = _borrowed_rows
-    return lambda tables, index, width: borrowed(tables, index, width)
-
-
-@intrinsic
-def _borrowed_rows(typing_context: Any, tables: Any, index: Any, width: Any) -> Any:
-    rows_type = types.Array(tables.dtype, 2, "C")
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        source = arrayobj.make_array(tables)(context, builder, arguments[0])
-        integer = context.get_value_type(types.intp)
-        size = context.get_abi_sizeof(context.get_data_type(tables.dtype))
-        height = builder.extract_value(source.shape, 1)
-        length = integer(width.count)
-        first = builder.mul(arguments[1], builder.mul(height, length))
-        view: Any = arrayobj.make_array(rows_type)(context, builder)
-        arrayobj.populate_array(
-            view,
-            data=builder.gep(source.data, [first], inbounds=True),
-            shape=cgutils.pack_array(builder, [height, length]),
-            strides=cgutils.pack_array(builder, [integer(size * width.count), integer(size)]),
-            itemsize=integer(size),
-            meminfo=None,
-        )
-        return view._getvalue()
-
-    return rows_type(tables, types.intp, width), generate

@@ -1,8 +1,8 @@
 """Choosing among actions by their values: greedy choice with random ties, and `AgentAction`.
 
-`AgentAction` of Algorithm 1, the action an assistant would put in place of the person's, is split
-in two, since a rule compares values before it needs an action: `candidate_value` says how good the
-replacement is, `pick` draws one of the actions of that value.
+`AgentAction` of Algorithm 1, the action an assistant would put in place of the proposed one, is
+split in two, since a rule compares values before it needs an action: `candidate_value` says how
+good the replacement is, `pick` draws one of the actions of that value.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def worst_value(values: np.ndarray) -> float:
 
 @compiled
 def second_value(values: np.ndarray) -> float:
-    """The largest of the values [A] strictly below the best; the best where all are equal."""
+    """The largest of the values [A] strictly below the best; the best if all are equal."""
     best = best_value(values)
     second = -np.inf
     for value in values:
@@ -41,7 +41,7 @@ def second_value(values: np.ndarray) -> float:
 
 @compiled
 def candidate_value(values: np.ndarray, second: bool) -> float:
-    """Value of the replacement action: second-best where `second` is set, else best."""
+    """Value of the replacement action: second-best if `second` is set, else best."""
     return second_value(values) if second else best_value(values)
 
 

@@ -2,22 +2,31 @@
 
 Numba's own cache looks at the file of the function alone; a compiled loop would keep calling an old
 decision rule after the rule's file had changed. Here the stamp of every cached function covers the
-sources of the whole package.
+sources of the whole package. What cannot be kept, or was damaged, is compiled again.
+
+With `NUMBA_DISABLE_JIT=1` nothing is compiled and everything runs as the Python that it is.
 """
 
 import contextlib
 import functools
 import hashlib
-from collections.abc import Callable
+import re
+import warnings
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+import numpy as np
+from numba.core import config
+from numba.core.caching import FunctionCache, NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 from numba.experimental import structref
 from numba.extending import register_jitable
+
+from qbumpers.errors import RequestError
+from qbumpers.kept_code import CodeFiles, KeptCodeWarning, reason
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,11 +59,83 @@ class _PackageCache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
-        self._cache_file = IndexDataCacheFile(
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=source_stamp(),
+        self._cache_file: Any = CodeFiles(
+            self._cache_path, self._impl.filename_base, source_stamp()
         )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Code from disk; None if there is none that can be used."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # of any kind: what is wrong can be made anew
+            _warn_once("cannot be used", f"in {self.cache_path}: {reason(error)}")
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep code on disk if that is possible."""
+        try:
+            super().save_overload(sig, data)
+        except Exception as error:
+            _warn_once("cannot be kept", f"in {self.cache_path}: {reason(error)}")
+
+
+class _NoCache(NullCache):
+    """In place of a cache if there is no folder for one."""
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        """Say that nothing is kept."""
+        _warn_once("cannot be kept", "no folder for it can be written")
+
+
+_warned: set[str] = set()
+
+
+def _warn_once(problem: str, detail: str) -> None:
+    """Warn of a problem with code on disk, once in a process: there are hundreds of functions."""
+    if problem not in _warned:
+        _warned.add(problem)
+        message = f"compiled code {problem} ({detail}); it is compiled anew, which takes seconds"
+        warnings.warn(message, KeptCodeWarning, stacklevel=2)
+
+
+class CompilationError(Exception):
+    """A function, or what it is to be called with, is nothing that Numba compiles."""
+
+
+_COLOUR_CODE = re.compile(r"\x1b\[[\d;]*m")
+
+
+def shortened(error: BaseException) -> str:
+    """The beginning of Numba's message in one line, without its colours."""
+    lines = _COLOUR_CODE.sub("", str(error)).splitlines()[:4]
+    return "; ".join(line.strip() for line in lines if line.strip())
+
+
+@contextlib.contextmanager
+def compiling_together(what: str) -> Iterator[None]:
+    """Within the block, an error of compiling says what was compiled.
+
+    Args:
+        what: for the message, for instance "assistant guide, learner q-learning".
+
+    Raises:
+        RequestError: in place of Numba's error.
+    """
+    try:
+        yield
+    except NumbaError as error:
+        raise RequestError(f"{what}: cannot be compiled together: {shortened(error)}") from error
+
+
+def compiles() -> bool:
+    """Whether functions are compiled at all: not with `NUMBA_DISABLE_JIT=1`."""
+    settings: Any = config  # which has its names when it is loaded
+    return not settings.DISABLE_JIT
+
+
+def is_compiled(function: Any) -> bool:
+    """Whether a function is one that Numba compiles."""
+    return isinstance(function, Dispatcher)
 
 
 def compiled(function: F) -> F:
@@ -96,8 +177,12 @@ def compiled_apart(function: F) -> F:
 
 def _kept(function: Any, settings: dict[str, Any]) -> Any:
     dispatcher: Any = numba.njit(**settings)(function)
-    with contextlib.suppress(RuntimeError):  # without a writable folder, every process compiles
+    if not is_compiled(dispatcher):
+        return np.errstate(all="ignore")(function)  # compiled code does not warn of numbers either
+    try:
         dispatcher._cache = _PackageCache(function)
+    except RuntimeError:  # without a writable folder, every process compiles
+        dispatcher._cache = _NoCache()
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda kinds, named: template(map(_any_integer, kinds), named)
     return dispatcher
@@ -119,8 +204,14 @@ def compiled_for_session(function: F) -> F:
 
     Returns:
         The same function, compiled at its first call.
+
+    Raises:
+        CompilationError: if it is no function but something else that can be called.
     """
-    dispatcher: Any = numba.njit(**INLINE)(function)
+    try:
+        dispatcher: Any = numba.njit(**INLINE)(function)
+    except TypeError as error:
+        raise CompilationError(f"{function!r} is not a function") from error
     return dispatcher
 
 
@@ -162,7 +253,7 @@ def hold(content: Any) -> Held:
 def entered(function: Any, *examples: Any) -> Any:
     """Compiled code for arguments of known types, entered without looking them up at every call.
 
-    The look-up takes microseconds where arguments are tuples. Nothing checks the types any more.
+    The look-up takes microseconds if arguments are tuples. Nothing checks the types any more.
 
     Args:
         function: compiled; one that is not is returned as it is.
@@ -178,7 +269,7 @@ def entered(function: Any, *examples: Any) -> Any:
 
 
 def uncompiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The Python source of a function, to be called where compiled code is no help.
+    """The Python source of a function, to be called if compiled code is no faster.
 
     Handing a few numbers over to compiled code and back takes longer than working them out.
 
@@ -201,10 +292,6 @@ def compiled_with(function: F, settings: dict[str, Any]) -> F:
     return numba.jit(**settings)(function)  # type: ignore[no-any-return]
 
 
-CompilationError = (NumbaError, TypeError)
-"""What compiling a function raises that Numba cannot compile."""
-
-
 def type_of(value: Any) -> Any:
     """The type that compiled code has for a value."""
     return numba.typeof(value)
@@ -221,18 +308,16 @@ def result_type(function: Any, *types: Any) -> Any:
         The type of what it returns.
 
     Raises:
-        NumbaError: if it cannot be compiled.
+        CompilationError: if it cannot be compiled.
     """
-    function.compile(types)
+    try:
+        function.compile(types)
+    except Exception as error:  # Numba raises much beside its own kind of errors
+        raise CompilationError(str(error)) from error
     # A constant has a type of its own, which is also that of other whole numbers.
     return numba.types.unliteral(function.overloads[types].signature.return_type)
 
 
-def is_compiled(function: Any) -> bool:
-    """Whether a function is one that Numba compiles."""
-    return isinstance(function, Dispatcher)
-
-
 def is_of_package(function: Any) -> bool:
-    """Whether a function is compiled and of this package, and so kept on disk."""
-    return is_compiled(function) and function.__module__.startswith("qbumpers.")
+    """Whether a function is of this package, whose compiled code is kept on disk."""
+    return str(function.__module__).startswith("qbumpers.")

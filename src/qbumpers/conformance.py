@@ -5,7 +5,6 @@ record: the same loops in plain Python, a `Session` that replays the record, and
 around an environment that plays it.
 """
 
-import functools
 from collections.abc import Iterable
 from typing import Any, NamedTuple, Unpack
 
@@ -15,7 +14,6 @@ from gymnasium import spaces
 
 from qbumpers.assistants import Assistant
 from qbumpers.decisions import Step
-from qbumpers.errors import RequestError
 from qbumpers.learners import dispatch, learner_for_settings
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.networks import Network
@@ -23,14 +21,15 @@ from qbumpers.random_streams import LEARNER, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.session import Session, replay, rows_of
 from qbumpers.shared_control import RECORD, SharedControl
-from qbumpers.simulation import Condition, Setup, deep, make_condition, tabular
-from qbumpers.tasks import TabularTask, Task, VectorTask, cliff_walking
+from qbumpers.simulation import Condition, Setup, make_condition
+from qbumpers.simulation.trials import engine_of
+from qbumpers.tasks import TabularTask, Task, cliff_walking
+from qbumpers.tasks.corridors import slippery_corridor, vector_corridor
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.values import NetworkValues, solve
 
 _EPISODES, _RETENTION, _SEED = 4, 1, 2019
 _TOLERANCE = 1e-12  # of probabilities: two ways to the same exponential
-_ENDS = TERMINATED | TRUNCATED | LIMIT
 
 
 class ConformanceError(AssertionError):
@@ -42,9 +41,9 @@ class Checked(NamedTuple):
 
     Attributes:
         task: name of the task.
-        host: that was held to the compiled simulator.
-        steps: that were compared.
-        overridden: of them.
+        host: what was held to the compiled simulator, for instance "Session".
+        steps: how many steps were compared.
+        overridden: on how many of them the assistant overrode the learner.
     """
 
     task: str
@@ -59,7 +58,7 @@ def check_conformance(
     """Take an assistant, and a learner if one is given, through every host.
 
     Args:
-        assistant: of a registered rule.
+        assistant: what is taken through the hosts.
         tasks: to try; small ones of this package that the assistant and the learner can do if None.
         **setup: `learner`, `perception`, `motor`, `forgetting`, see `qbumpers.simulation.Setup`.
 
@@ -82,8 +81,7 @@ def check_conformance(
 
 
 def _check_hosts(condition: Condition) -> list[Checked]:
-    engine: Any = tabular if condition.task.states else deep
-    trial, name = range(1), condition.task.name
+    engine, trial, name = engine_of(condition.task), range(1), condition.task.name
     steps: Step = engine.record(condition, trial, _SEED, None)
     plain = engine.record(condition, trial, _SEED, None, interpreted=True)
     _compare(f"{name}, plain Python", steps, plain)
@@ -214,9 +212,9 @@ def check_policy(settings: Any, *, draws: int = 20_000, seed: int = _SEED) -> fl
     less often than once in a million states.
 
     Args:
-        settings: of a registered learner that observes states.
-        draws: of `choose` in each state that is looked at.
-        seed: of the random streams.
+        settings: of a registered learner of numbered states; they select the learner.
+        draws: how often `choose` is called in each state that is looked at.
+        seed: decides what the learner draws.
 
     Returns:
         The largest difference, as a share of the largest that is allowed.
@@ -290,62 +288,3 @@ def _random_network(generator: np.random.Generator, task: Task) -> NetworkValues
     return NetworkValues(
         network, task.observation_size, task.actions, parameters, 0.9, task.name, "random"
     )
-
-
-@functools.cache
-def slippery_corridor() -> TabularTask:
-    """Five cells and four actions: back, on (slips back 1 time in 4), stay, and back to the start.
-
-    Every step costs 1; the last cell ends the episode with 10. As many actions as Cliff Walking
-    has, so that loops are compiled once for both.
-    """
-    transition = np.zeros((5, 4, 5))
-    for cell in range(5):
-        back, on = max(cell - 1, 0), min(cell + 1, 4)
-        transition[cell, 0, back] += 1
-        transition[cell, 1, on] += 0.75
-        transition[cell, 1, back] += 0.25
-        transition[cell, 2, cell] += 1
-        transition[cell, 3, 0] += 1
-    reward = np.full((5, 4, 5), -1.0)
-    reward[:, :, 4] = 10
-    last = np.arange(5) == 4
-    return TabularTask.from_arrays(
-        transition, reward, last, start=0, discount=0.95, episode_limit=12, name="corridor",
-        success=last,
-    )  # fmt: skip
-
-
-class _Corridor:
-    """A place in [0, 1] to be moved to its end."""
-
-    def reset(self, chance: float) -> np.ndarray:
-        self._place = 0.3 * chance
-        return self._seen()
-
-    def step(self, action: int) -> tuple[np.ndarray, float, int]:
-        self._place = min(max(self._place + (0.2 if action else -0.1), 0.0), 1.0)
-        arrived = self._place >= 1
-        return self._seen(), 10.0 if arrived else -1.0, (TERMINATED | SUCCESS) * arrived
-
-    def _seen(self) -> np.ndarray:
-        return np.array([self._place, 1 - self._place], np.float32)
-
-    def snapshot(self) -> float:
-        return self._place
-
-    def restore(self, snapshot: float) -> None:
-        self._place = snapshot
-
-
-def vector_corridor() -> VectorTask:
-    """A corridor whose place is observed as two numbers."""
-    return VectorTask(
-        name="vector-corridor", make_stepper=_Corridor, make_environment=_no_environment,
-        observation_size=2, actions=2, discount=0.9, episode_limit=12, settings={},
-        has_success=True, has_crash=False, undoable=True, no_op=0,
-    )  # fmt: skip
-
-
-def _no_environment(render_mode: str | None = None) -> Any:
-    raise RequestError("task vector-corridor: it is for checks alone and has no pictures")

@@ -2,7 +2,7 @@
 
 Every host (the Gymnasium wrapper, the simulators, a session with a person) builds the same
 `Situation`, draws the same `Noise`, calls the same rule, keeps the same `Step` and counts returns
-by the same functions: `begin`, `situate`, `checked_action`, `step_of`, `settle`.
+by the same functions: `begin`, `situate`, `execution_of`, `step_of`, `settle`.
 """
 
 from typing import Any, NamedTuple
@@ -70,6 +70,29 @@ class Decision(NamedTuple):
     undo: bool = False
 
 
+def checked_decision(found: Any, assistant: str) -> Decision:
+    """What a rule returned, if it is a decision.
+
+    Args:
+        found: by a rule that runs as plain Python.
+        assistant: its name, for the message.
+
+    Raises:
+        RequestError: if it is something else, or not made of numbers.
+    """
+    numbers, given = (int, float, np.number), found
+    if not (
+        isinstance(found, Decision)
+        and isinstance(given.action, numbers)
+        and isinstance(given.probability, numbers)
+    ):
+        raise RequestError(
+            f"assistant {assistant}: its rule returns {found!r}; a Decision is needed, of an "
+            "action and a probability"
+        )
+    return found
+
+
 class Step(NamedTuple):
     """The record of one assisted step, the same from every host; or, with arrays [N], a table.
 
@@ -81,12 +104,12 @@ class Step(NamedTuple):
         undone: whether the state was taken back to `state` after the action.
         credited: the action that the learner credits with the outcome; -1 if it learns nothing.
         overridden: whether `executed` differs from `proposed`, or the step was undone.
-        probability: of an override, before the coin.
+        probability: that the rule gave an override before the coin was tossed, in [0, 1].
         coin: the noise that decided whether to override.
         tie: the noise that chose among equally good actions.
         values: float64 [A], the assistant's action values in `state`; of a table [N, A].
         projected_return: G(s_t, proposed), see `projected_return`.
-        reward: of the environment for the executed action.
+        reward: what the environment gave for the executed action.
         next_state: where the action led, also if the step was undone.
         events: bits of `qbumpers.tasks.dynamics`; they tell every end of an episode, the step limit
             included.
@@ -117,7 +140,7 @@ class Model(NamedTuple):
         observation_size: D, numbers of an observation; 0 if states are numbered.
         actions: A.
         no_op: the action that does nothing; -1 if there is none.
-        discount: of the assistant's values.
+        discount: with which the assistant's values and the account discount, in (0, 1].
         dynamics: transitions of a task with a table, `qbumpers.tasks.dynamics.Dynamics`; else None.
         distance: float64 [A, A] between actions; 0 on the diagonal and 1 elsewhere if the task
             states none.
@@ -176,7 +199,7 @@ def begin(values: np.ndarray, episode: int) -> Account:
         values: float64 [A], Q*(s_0, .).
         episode: episodes of this learner or participant before this one.
     """
-    return Account(0.0, 1.0, best_value(values), episode, 0)
+    return Account(0.0, 1.0, float(best_value(values)), episode, 0)
 
 
 @inlined
@@ -196,7 +219,7 @@ def settle(account: Account, reward: float, discount: float) -> Account:
 
     Args:
         account: before it.
-        reward: of the step.
+        reward: what the environment gave on the step.
         discount: gamma, of the assistant's values.
     """
     return Account(
@@ -206,18 +229,6 @@ def settle(account: Account, reward: float, discount: float) -> Account:
         account.episode,
         account.step + 1,
     )
-
-
-@inlined
-def checked_action(action: int, actions: int) -> int:
-    """The action that a rule chose, if there is such an action.
-
-    Raises:
-        RequestError: if it does not lie in [0, `actions`).
-    """
-    if not 0 <= action < actions:
-        raise RequestError("the assistant's rule chose an action outside the action space")
-    return action
 
 
 class Execution(NamedTuple):
@@ -232,6 +243,32 @@ class Execution(NamedTuple):
     executed: int
     undone: bool
     probability: float
+
+
+@inlined
+def is_action(action: float, actions: int) -> bool:
+    """Whether a number is an action: whole, and in [0, `actions`)."""
+    return 0 <= action < actions and int(action) == action
+
+
+@inlined
+def execution_of(decision: Decision, undone: bool, actions: int) -> Execution:
+    """What a decision asks for, if it can be done.
+
+    Args:
+        decision: of a rule; its `undo` is not looked at, since compiled code may lack it.
+        undone: whether the state is to be taken back.
+        actions: A.
+
+    Raises:
+        RequestError: if its action is not a whole number in [0, A), or its probability not a number
+            in [0, 1].
+    """
+    if not is_action(decision.action, actions):
+        raise RequestError("the rule's action is not a whole number in [0, number of actions)")
+    if not 0 <= decision.probability <= 1:
+        raise RequestError("the rule's probability of an override does not lie in [0, 1]")
+    return Execution(int(decision.action), undone, float(decision.probability))
 
 
 @inlined
@@ -251,7 +288,7 @@ def step_of(
         execution.undone, credited, overridden, execution.probability, noise.coin, noise.tie,
         situation.values,
         projected_return(
-            situation.earned, situation.discount, situation.values[situation.proposed]
+            situation.earned, situation.discount, float(situation.values[situation.proposed])
         ),
         reward, next_state, events,
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """Errors that a user can mend: each names the field, the value and what is allowed."""
 
 import difflib
+import operator
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +13,31 @@ class RequestError(ValueError):
     """The request was wrong: a name, an option, a file or an environment that cannot serve."""
 
 
+def whole_number(value: Any, where: str, allowed: str) -> int:
+    """A number of an action or the like.
+
+    Args:
+        value: an int or one of NumPy's integers; a fraction or a text is no such number, and is not
+            rounded.
+        where: for the message, for instance "action".
+        allowed: for the message, for instance "in [0, 4)".
+
+    Raises:
+        RequestError: if it is not whole.
+    """
+    try:
+        return operator.index(value)
+    except TypeError as error:
+        raise RequestError(f"{where} = {value!r}; a whole number {allowed} is needed") from error
+
+
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:
     """An error for an unknown name, with the nearest known one.
 
     Args:
         kind: what was named, for instance "assistant".
         name: what the user wrote.
-        known: the names that exist.
+        known: names that would have been right, which the message lists.
 
     Returns:
         The error, to be raised by the caller.
@@ -46,7 +65,7 @@ def from_validation(
     Returns:
         The error, to be raised by the caller.
     """
-    problems = []
+    problems: list[str] = []
     for problem in error.errors(include_url=False):
         field = ".".join(str(part) for part in problem["loc"])
         given = "" if problem["type"] == "missing" else f" = {problem['input']!r}"
@@ -75,8 +94,12 @@ def checked(kind: type, fields: Mapping[str, Any], where: str) -> Any:
         RequestError: naming each field that is wrong, its value and what is allowed.
     """
     from pydantic import TypeAdapter, ValidationError
+    from pydantic.errors import PydanticUserError
 
     try:
         return TypeAdapter(kind).validate_python(dict(fields), strict=True)
     except ValidationError as error:
         raise from_validation(error, where) from error
+    except PydanticUserError as error:
+        reason = str(error).partition(". ")[0]
+        raise RequestError(f"{where}: {reason}") from error

@@ -127,7 +127,7 @@ class LocalFolder:
     """A folder of this machine, or a shared one that is mounted on it.
 
     Args:
-        path: of the folder.
+        path: where the folder is; it need not exist yet.
     """
 
     def __init__(self, path: Path) -> None:
@@ -191,7 +191,7 @@ class RemoteFolder:
     """A folder that fsspec reaches, for example in an object store.
 
     Args:
-        url: of the folder.
+        url: where the folder is, for instance "s3://bucket/results".
 
     Raises:
         RequestError: if the URL is of no known kind, or what it needs is not installed.

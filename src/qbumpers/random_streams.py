@@ -19,8 +19,8 @@ LEARNER, ASSISTANT, ENVIRONMENT, EVALUATION = range(4)
 
 _STREAMS = 4
 _SEED_WORDS = 3
-_TRIAL_BITS = 64  # room for the episodes of a trial, in blocks of Philox
-_BLOCKS = _STREAMS * _SEED_WORDS // 4  # of Philox a trial, each of four 64-bit words
+_TRIAL_BITS = 64  # from trial to trial, more blocks of Philox than its episodes can use
+_BLOCKS = _STREAMS * _SEED_WORDS // 4  # of Philox per trial, each of four 64-bit words
 _ONE = np.uint64(1)
 _SHIFT_3, _SHIFT_11 = np.uint64(3), np.uint64(11)
 _SHIFT_24, _SHIFT_40 = np.uint64(24), np.uint64(40)
@@ -48,7 +48,7 @@ def trial_streams(seed: int, content: Any, trials: range) -> np.ndarray:
     """The streams of trials of one condition.
 
     Args:
-        seed: of the experiment, not negative.
+        seed: the experiment's, not negative.
         content: what the condition is, as JSON-like data; see `content_words`.
         trials: which trials.
 
@@ -67,7 +67,7 @@ def episode_streams(seed: int, content: Any, trials: range, episodes: int) -> np
     """Streams that begin anew in every episode.
 
     Args:
-        seed: of the experiment, not negative.
+        seed: the experiment's, not negative.
         content: what has these streams in common, as JSON-like data; see `content_words`.
         trials: which trials.
         episodes: E, of a trial; the streams of its first ones do not depend on how many follow.

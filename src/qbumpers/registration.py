@@ -6,9 +6,10 @@ among the settings reach it as such.
 """
 
 import contextlib
+import inspect
 import itertools
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +17,14 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from qbumpers.compilation import CompilationError, compiled_for_session, is_compiled
+from qbumpers.compilation import (
+    CompilationError,
+    compiled_for_session,
+    compiles,
+    is_compiled,
+    shortened,
+    uncompiled,
+)
 from qbumpers.errors import RequestError
 
 _registrations = itertools.count()
@@ -32,13 +40,17 @@ File = Annotated[str, _FILE]
 
 
 def checked_class(kind: Any, where: str) -> type:
-    """A class of settings, if it is a NamedTuple.
+    """A class of settings, if it is a NamedTuple with types that can be looked up.
 
     Raises:
         RequestError: if it is not.
     """
     if not (isinstance(kind, type) and hasattr(kind, "_fields")):
         raise RequestError(f"{where} is {kind!r}; a NamedTuple class is needed")
+    try:
+        get_type_hints(kind)
+    except Exception as error:  # whatever looking up a written name comes to
+        raise RequestError(f"{where}: the types of its fields cannot be found: {error}") from error
     return kind
 
 
@@ -55,6 +67,7 @@ def fresh_class(kind: type, name: str, remade: Callable[[str, tuple[Any, ...]], 
     """
 
     def reduce(instance: tuple[Any, ...]) -> Any:
+        """How pickle makes an instance again: by name, as the class there is another."""
         return remade, (name, tuple(instance))
 
     members = {"__slots__": (), "__reduce__": reduce}
@@ -70,7 +83,31 @@ def original_class(kind: type) -> type:
 
 def is_written_here(part: Any) -> bool:
     """Whether a function or class is of this package; so is None, which is nobody's."""
-    return part is None or part.__module__.partition(".")[0] == __name__.partition(".")[0]
+    return part is None or str(part.__module__).partition(".")[0] == __name__.partition(".")[0]
+
+
+def check_arguments(function: Any, arguments: Sequence[str], where: str) -> None:
+    """Check that something can be called as it will be.
+
+    Args:
+        function: of the user's own, compiled or not.
+        arguments: what it will be given, by position.
+        where: for messages, for instance "rule 'guide': observe".
+
+    Raises:
+        RequestError: if it cannot.
+    """
+    given = f"({', '.join(arguments)})"
+    if not callable(function):
+        raise RequestError(f"{where} is {function!r}; a function of {given} is needed")
+    try:
+        signature = inspect.signature(uncompiled(function))
+    except (TypeError, ValueError):  # of functions in C that do not tell
+        return
+    try:
+        signature.bind(*arguments)
+    except TypeError as error:
+        raise RequestError(f"{where} takes {signature}; it is called with {given}") from error
 
 
 def compiled_or_plain(
@@ -82,30 +119,37 @@ def compiled_or_plain(
         what: they belong to, for instance "assistant 'guide'".
         functions: of Python or compiled; None is left as it is.
         attempts: by what they are compiled for, for instance "states"; each is called with the
-            functions and raises what Numba does. One that succeeds is enough.
+            functions and raises CompilationError if it fails. One that succeeds is enough.
 
     Returns:
         The functions, and what they compile for: nothing if they are plain Python.
     """
-    session = tuple(
-        f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
-    )
-    reason = ""
-    for kind, attempt in attempts.items():
-        try:
-            attempt(*session)
-            return session, frozenset({kind})
-        except CompilationError as error:
-            reason = reason or shortened(error)
+    if not compiles():
+        return functions, frozenset()
+    try:
+        return _compiled(functions, attempts)
+    except CompilationError as error:
+        reason = shortened(error)
     warnings.warn(
         f"{what} cannot be compiled and will run as plain Python, slower: {reason}", stacklevel=4
     )
     return functions, frozenset()
 
 
-def shortened(error: BaseException) -> str:
-    """Numba's message in one line."""
-    return "; ".join(line.strip() for line in str(error).splitlines()[:4] if line.strip())
+def _compiled(
+    functions: tuple[Any, ...], attempts: Mapping[str, Callable[..., None]]
+) -> tuple[tuple[Any, ...], frozenset[str]]:
+    session = tuple(
+        f if f is None or is_compiled(f) else compiled_for_session(f) for f in functions
+    )
+    errors = []
+    for kind, attempt in attempts.items():
+        try:
+            attempt(*session)
+            return session, frozenset({kind})
+        except CompilationError as error:
+            errors.append(error)
+    raise errors[0]
 
 
 def sample(kind: Any, nested: Any = None) -> Any:
@@ -113,27 +157,39 @@ def sample(kind: Any, nested: Any = None) -> Any:
 
     Args:
         kind: the class; bounds are not looked at.
-        nested: what stands for the settings of something else.
+        nested: what stands for the settings of something else, a field `of`.
+
+    Raises:
+        CompilationError: if compiled code does not take settings of a type.
     """
     defaults = kind._field_defaults
     hints = get_type_hints(kind, include_extras=True)
-    return kind._make(_sample_of(hints.get(f), defaults.get(f), nested) for f in kind._fields)
+    return kind._make(
+        nested
+        if field == "of" and nested is not None
+        else _sample_of(hints.get(field), defaults.get(field))
+        for field in kind._fields
+    )
 
 
-def _sample_of(hint: Any, default: Any, nested: Any) -> Any:
+def _sample_of(hint: Any, default: Any) -> Any:
     if _is_file(hint):
         return np.zeros((0, 0))
     plain = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    if plain is Any:
-        return nested
     if get_origin(plain) is Literal:
         return 0
     if get_origin(plain) is tuple:
         parts = [part for part in get_args(plain) if part is not Ellipsis]
-        return default if default else tuple(_sample_of(part, None, nested) for part in parts)
+        return default or tuple(_sample_of(part, None) for part in parts)
     if hasattr(plain, "_fields"):
-        return sample(plain, nested)
-    return {float: 0.0, int: 0, bool: False}.get(plain, 0.0)
+        return sample(plain)
+    if hint is None:  # a NamedTuple without types
+        return default if isinstance(default, int | float) else 0.0
+    numbers = {float: 0.0, int: 0, bool: False}
+    if plain not in numbers:
+        kind = inspect.formatannotation(plain)
+        raise CompilationError(f"compiled code takes no settings of the type {kind}")
+    return numbers[plain]
 
 
 def as_numbers(settings: Any) -> Any:
@@ -194,7 +250,7 @@ def _number_of(value: Any, hint: Any, field: str) -> Any:
     if _is_file(hint):
         return _numbers_in(value, field)
     plain = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    return get_args(plain).index(value)
+    return get_args(plain).index(value) if get_origin(plain) is Literal else value
 
 
 def _is_file(hint: Any) -> bool:
@@ -206,9 +262,9 @@ def _numbers_in(name: str, field: str) -> np.ndarray:
     if name in _kept.get():
         return _kept.get()[name]
     try:
-        found = np.load(name) if Path(name).suffix == ".npy" else np.loadtxt(name, delimiter=",")
+        found = np.load(name) if Path(name).suffix == ".npy" else _numbers_between_commas(name)
         numbers = np.ascontiguousarray(np.atleast_2d(found), np.float64)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError, TypeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise RequestError(
             f"{field} = {name!r}: not a .npy or .csv file of numbers ({reason})"
@@ -216,3 +272,10 @@ def _numbers_in(name: str, field: str) -> np.ndarray:
     if not np.isfinite(numbers).all():
         raise RequestError(f"{field} = {name!r}: every number in it must be finite")
     return numbers
+
+
+def _numbers_between_commas(name: str) -> np.ndarray:
+    lines = Path(name).read_text(encoding="utf-8-sig").splitlines()  # spreadsheets write a mark
+    if not any(lines):
+        raise ValueError("it is empty")
+    return np.loadtxt(lines, delimiter=",")

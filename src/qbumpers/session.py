@@ -5,12 +5,14 @@ decides, keeps the account and gives the record of each step. What it is after a
 is a fold of their records, so a session can be replayed.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import uncompiled
 from qbumpers.decisions import (
     Account,
@@ -21,12 +23,12 @@ from qbumpers.decisions import (
     Situation,
     Step,
     begin,
-    checked_action,
+    execution_of,
     settle,
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, whole_number
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
@@ -45,7 +47,7 @@ class Session:
     """One learner or participant with one assistant.
 
     Args:
-        assistant: that decides.
+        assistant: what decides, a rule with its options.
         values: Q* of the assistant, any callable from a state or observation to one value per
             action; with `others`, a mapping of further ones by name, if the assistant's rule named
             any.
@@ -56,7 +58,7 @@ class Session:
     Attributes:
         perception: what the learner believes happened, as numbers.
         decision: the decision that awaits its `record`; None if there is none.
-        account: of the episode.
+        account: what was earned in the episode so far, see `qbumpers.decisions.Account`.
         state: the present state, as in `Situation`.
         values_now: float64 [A], the assistant's values in the present state, read-only; None
             between episodes.
@@ -106,30 +108,35 @@ class Session:
 
         Args:
             proposed: in [0, A).
-            noise: of this decision.
+            noise: coin and tie of this decision, for instance `noise_of(seed, number)`.
 
         Raises:
-            RequestError: outside an episode, before the last decision was recorded, or if there is
-                no such action.
+            RequestError: outside an episode, before the last decision was recorded, if there is no
+                such action, or if the rule decides on something that cannot be done.
         """
         row = self.values_now
         if row is None or self.decision is not None:
             missing = "begin(state)" if row is None else "record(...) of the last decision"
             raise RequestError(f"decide: {missing} must come first")
-        if not 0 <= proposed < self.model.actions:
-            raise RequestError(f"proposed = {proposed!r}; it must lie in [0, {self.model.actions})")
+        actions = self.model.actions
+        proposed = whole_number(proposed, "proposed", f"in [0, {actions})")
+        if not 0 <= proposed < actions:
+            raise RequestError(f"proposed = {proposed!r}; it must lie in [0, {actions})")
         situation = situate(self.account, self.state, row, self._others_now, proposed)
         decision = self.assistant.decide(situation, noise, self._memory)
-        executed = checked_action(int(decision.action), self.model.actions)
+        try:
+            executed, undone, probability = execution_of(decision, bool(decision.undo), actions)
+        except RequestError as error:
+            raise RequestError(f"assistant {self.assistant.name}: {decision}: {error}") from error
         self._situation, self._noise = situation, noise
-        self.decision = Decision(executed, float(decision.probability), decision.undo)
+        self.decision = Decision(executed, probability, undone)
         return self.decision
 
     def record(self, reward: float, next_state: Any, events: int, notice: float = 0.0) -> Step:
         """The record of the step that was decided, once the action has happened.
 
         Args:
-            reward: of the executed action.
+            reward: what the environment gave for the executed action.
             next_state: where it led, also if the step is undone.
             events: bits of `qbumpers.tasks.dynamics`. Of an undone step only `LIMIT` ends the
                 episode.
@@ -139,11 +146,16 @@ class Session:
             The step.
 
         Raises:
-            RequestError: if nothing was decided, or the values do not fit the next state.
+            RequestError: if nothing was decided, the reward is not finite, or the values do not fit
+                the next state.
         """
         decision = self.decision
         if decision is None:
             raise RequestError("record: decide(...) must come first")
+        if not math.isfinite(reward):
+            self.values_now = None  # the account is lost: nothing more can be decided
+            step = self.account.step + 1
+            raise RequestError(f"reward = {reward!r} of step {step}; it must be finite")
         situation: Situation = self._situation
         happened = events & ~(TERMINATED | TRUNCATED) if decision.undo else events
         experience = _perceive(
@@ -181,7 +193,8 @@ def _as_state(state: Any) -> Any:
     if isinstance(state, int | np.integer):
         return int(state)
     if isinstance(state, np.ndarray) and state.ndim == 1 and state.dtype.kind in "fiub":
-        return np.asarray(state, np.float32)
+        # A copy: environments may go on writing into what they returned.
+        return read_only(np.array(state, np.float32))
     return None
 
 
@@ -189,8 +202,8 @@ def noise_of(seed: int, number: int) -> Noise:
     """The noise of one decision, by its number alone: a restarted host needs nothing else.
 
     Args:
-        seed: of the session, not negative.
-        number: of the decision, from 0.
+        seed: one per session, not negative.
+        number: which decision of the session, counted from 0.
 
     Returns:
         The same noise for the same arguments.

@@ -1,15 +1,16 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
 from pathlib import Path
-from typing import Any, SupportsFloat
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model, Noise, Step
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, whole_number
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
@@ -109,7 +110,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             "no_op": model.no_op >= 0,
         }
         self.assistant.check_task(str(self.env.spec.id if self.env.spec else self.env), has)
-        return model
+        return read_only(model)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -133,7 +134,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         )  # fmt: skip
         return observation, {**info, RECORD: first._asdict()}
 
-    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
 
         Raises:
@@ -146,11 +147,10 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             raise gymnasium.error.ResetNeeded(
                 "call reset() before step(), and after an episode's end"
             )
-        proposed = int(action) - first
+        allowed = f"in [{first}, {first + self._actions})"
+        proposed = whole_number(action, "action", allowed) - first
         if not 0 <= proposed < self._actions:
-            raise RequestError(
-                f"action = {action!r}; it must lie in [{first}, {first + self._actions})"
-            )
+            raise RequestError(f"action = {action!r}; it must lie {allowed}")
         decision = session.decide(proposed, self._next_noise())
         before = self._undo[0]() if decision.undo and self._undo else None
         observation, reward, terminated, truncated, info = self.env.step(decision.action + first)

@@ -18,8 +18,8 @@ class Page(HTMLParser):
         self.close()
         assert self.open == []
 
-    def handle_starttag(self, tag, attributes):
-        values = dict(attributes)
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
         self.references += [
             values[key] for key in ("src", "href", "action", "data") if key in values
         ]
@@ -69,7 +69,7 @@ def content(address):
 
 
 def number(value, digits=1):
-    """A number as reports write it, a dash where there is none."""
+    """A number as reports write it, a dash if there is none."""
     return "–" if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 

@@ -15,7 +15,7 @@ def test_narrow_intervals_have_more_decimals(low, high, digits):
     assert decimals_for(low, high) == digits
 
 
-@pytest.mark.parametrize("people", [6, 8, 10])
-def test_equal_returns_have_no_more_decimals_however_their_mean_is_rounded(people):
-    found = mean_interval(np.full(people, 235.4773847239))
+@pytest.mark.parametrize("trials", [6, 8, 10])
+def test_equal_returns_have_no_more_decimals_however_their_mean_is_rounded(trials):
+    found = mean_interval(np.full(trials, 235.4773847239))
     assert decimals_for(found.low, found.high) == 1

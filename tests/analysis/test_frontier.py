@@ -104,7 +104,8 @@ def reached_by_hand(points, level, axis):
     frontier = sorted(points[index].tolist()[:: 1 - 2 * axis] for index in pareto(points))
     if level > frontier[-1][0]:
         return math.nan
-    return float(np.interp(level, *zip(*frontier, strict=True)))
+    levels, reached = zip(*frontier, strict=True)
+    return float(np.interp(level, levels, reached))
 
 
 @given(st.lists(POINTS, min_size=1, max_size=3), st.sampled_from([0, 1]), st.floats(-5, 5))
@@ -142,7 +143,7 @@ PERFORMANCE = 1 - 27 / 29
 
 
 def drawn(mean, generator, trials=100):
-    """Trials whose two measures are correlated, as those of one person are."""
+    """Trials whose two measures are correlated, as those of one learner are."""
     covariance = [[4.0, 12.0], [12.0, 1600.0]]
     return generator.multivariate_normal(mean, covariance, trials)
 

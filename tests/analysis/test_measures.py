@@ -38,7 +38,7 @@ def episodes(trials=TRIALS, known=True, length=EPISODES, retained=0):
 
     def row(condition, trial, episode):
         alpha = CONDITIONS[condition]
-        helped = alpha is not None and episode < length
+        is_assisted = alpha is not None and episode < length
         return {
             "condition": condition,
             "assistant": condition.partition("/")[0],
@@ -51,7 +51,7 @@ def episodes(trials=TRIALS, known=True, length=EPISODES, retained=0):
             "unassisted_return": generator.normal(-200, 90) + 10 * trial,
             "assisted_length": int(generator.integers(1, 100)),
             "unassisted_length": int(generator.integers(1, 100)),
-            "overrides": int(generator.integers(0, 9)) * helped,
+            "overrides": int(generator.integers(0, 9)) * is_assisted,
             **{event: bool(generator.random() < 0.4) if known else None for event in EVENTS},
         }
 
@@ -218,9 +218,9 @@ def test_a_summary_has_columns_of_what_is_known_alone():
 
 def test_a_measure_known_of_some_conditions_is_null_elsewhere():
     table = episodes()
-    helped = pl.col("condition") != "none"
+    is_assisted = pl.col("condition") != "none"
     trials = trial_measures(table).with_columns(
-        assisted_crash=pl.when(helped).then("assisted_crash")
+        assisted_crash=pl.when(is_assisted).then("assisted_crash")
     )
     found = summary(trials, OPTIONS, EPISODES)
     for part in ("mean", "low", "high"):

@@ -79,6 +79,7 @@ def test_what_there_is_is_loaded_if_that_is_asked_for(part, whole):
         if counts.get(each.condition, 0) < TRIALS
     }
     assert sum(results.missing.values()) == 8 * SIZE
+    assert results.states is not None
     for counted in ("assisted", "unassisted"):
         steps = results.episodes.group_by("condition").agg(pl.col(f"{counted}_length").sum())
         states = results.states.group_by("condition").agg(pl.col(counted).sum())

@@ -56,6 +56,20 @@ def guide_within_budget(situation, noise, options, memory):
     return Decision(pick(situation.values, best, noise.tie), 1.0)
 
 
+def no_sign(options, model):
+    return 0
+
+
+def follow_signs(situation, noise, options, memory):
+    """Half of the time, the action that the numbers of the last places and this one add up to."""
+    pointed = (situation.state + memory) % len(situation.values)
+    return Decision(pointed if noise.coin < 0.5 else situation.proposed, 0.5)
+
+
+def remember_signs(memory, step, options):
+    return 3 * step.state + 5 * step.next_state
+
+
 class TakeBackOptions(NamedTuple):
     tolerance: float = 1.5
 

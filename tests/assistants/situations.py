@@ -36,7 +36,7 @@ def step_of(situation, executed, *, undone=False, **changes):
 
 
 def model_of(actions=3, states=5):
-    """What a rule with memory is told of some task."""
+    """What a rule with memory may know of some task."""
     return Model(states, 0, actions, -1, 0.9, None, 1 - np.eye(actions))
 
 

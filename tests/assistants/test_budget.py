@@ -1,6 +1,7 @@
 """A budget over another rule, decision by decision; `test_loops` holds it to the plain one."""
 
 import pickle
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ NOISE = Noise(0.25, 0.5)
 BAD, GOOD = situation_of([1.0, 3.0, 3.0], 0), situation_of([1.0, 3.0, 3.0], 2)
 
 
-def budget(per_episode, of="maximal"):
+def budget(per_episode, of: Any = "maximal"):
     return make_assistant("budget", per_episode=per_episode, of=of)
 
 

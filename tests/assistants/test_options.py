@@ -72,16 +72,26 @@ def test_wrong_tuples_and_texts_are_refused(path, options, message):
 def test_files_that_hold_no_finite_numbers_are_refused(tmp_path):
     with pytest.raises(RequestError, match=r"table = '.*missing\.npy': .*No such file"):
         made(tmp_path / "missing.npy")
-    with pytest.raises(RequestError, match=r"table = '.*missing\.csv': .*not found"):
+    with pytest.raises(RequestError, match=r"table = '.*missing\.csv': .*No such file"):
         made(tmp_path / "missing.csv")
     words = tmp_path / "words.csv"
     words.write_text("up,down\n")
     with pytest.raises(RequestError, match=r"words\.csv': not a .npy or .csv file of numbers"):
         made(words)
+    for name in ("empty.npy", "empty.csv"):
+        (tmp_path / name).touch()
+        with pytest.raises(RequestError, match=rf"{name}': not a .npy or .csv file of numbers"):
+            made(tmp_path / name)
     for value in (np.nan, np.inf):
         np.save(tmp_path / "broken.npy", np.array([[1.0, value]]))
         with pytest.raises(RequestError, match=r"broken\.npy': every number in it must be finite"):
             made(tmp_path / "broken.npy")
+
+
+def test_a_table_that_begins_with_a_mark_of_its_encoding_is_read(path):
+    marked = path.with_name("marked.csv")
+    marked.write_bytes(b"\xef\xbb\xbf1,2,3\r\n4,5,6\r\n")
+    assert np.array_equal(made(marked).numbers.table, TABLE)
 
 
 def mind_the_order(situation, noise, options):
@@ -111,7 +121,7 @@ def test_a_rule_in_plain_python_that_unpacks_a_situation_is_told_too():
 
 
 def test_start_takes_the_model_too():
-    with pytest.raises(RequestError, match=r"'own': start takes two arguments, \(options, model\)"):
+    with pytest.raises(RequestError, match=r"start takes \(options\); .* \(options, model\)"):
         register_assistant("own", OwnBudget, start=lambda options: 0, observe=spend)
 
 

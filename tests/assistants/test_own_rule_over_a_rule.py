@@ -29,7 +29,7 @@ def as_the_other(situation, noise, options, memory):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def over():
+def over(own_registry_of_module):
     name = "over-another"
     register = register_assistant(name, OverOptions, start=start_other, observe=observe_other)
     register(as_the_other)

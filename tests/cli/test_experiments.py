@@ -1,4 +1,4 @@
-"""`qbumpers reproduce` and `run` where people learn networks."""
+"""`qbumpers reproduce` and `run` if learners learn networks."""
 
 import subprocess
 import sys

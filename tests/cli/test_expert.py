@@ -1,12 +1,16 @@
 """`qbumpers expert`: solve, train, check."""
 
+import numpy as np
 import pytest
+from stable_baselines3 import DQN
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.vec_env import VecNormalize
 
 from qbumpers import load_values, solve
-from qbumpers.cli import expert as command
 from qbumpers.experts import correcting, visiting
 from qbumpers.tasks import make_task
-from qbumpers.values import TabularValues
+from qbumpers.values import NetworkValues, TabularValues
+from tests.narrowing import of_kind
 from tests.values.networks import constant, network_of
 
 POLE = ("CartPole-v1", "--discount", "0.9")
@@ -48,7 +52,7 @@ def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
     assert status == 0
     assert "return, 10% after 50" in output
     assert "Kept seed" in output
-    values = load_values("expert.npz")
+    values = of_kind(NetworkValues, load_values("expert.npz"))
     assert "the best of seeds 0, 1; return" in values.method
     assert values.network.hidden == (8,)
     kept = sorted((tmp_path / "expert.npz.work").iterdir())
@@ -121,7 +125,6 @@ def test_the_help_states_the_rule_of_choice(call):
     said = " ".join(output.split())
     for part in ("2% random actions", "10% random actions", "after 50 random actions"):
         assert part in said
-    assert command.expert.__doc__
 
 
 def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_path):
@@ -141,4 +144,52 @@ def test_a_stopped_training_goes_on_with_what_is_missing(call, monkeypatch, tmp_
     monkeypatch.setattr(choosing, "train_expert", original)
     assert call("expert", *QUICK)[0] == 0
     assert kept.stat().st_mtime_ns == before
-    assert load_values("CartPole-v1.npz").inputs == 4
+    assert of_kind(NetworkValues, load_values("CartPole-v1.npz")).inputs == 4
+
+
+@pytest.fixture
+def model():
+    """A model that saw normalised observations, and its statistics, in files."""
+    statistics = VecNormalize(make_vec_env("CartPole-v1"), norm_reward=False)
+    shape = {"net_arch": [8]}
+    model = DQN("MlpPolicy", statistics, learning_starts=50, seed=0, policy_kwargs=shape)
+    model.learn(200)
+    model.save("model.zip")
+    statistics.save("statistics.pkl")
+    observations = np.random.default_rng(0).normal(0, 0.1, (50, 4)).astype(np.float32)
+    best = model.predict(statistics.normalize_obs(observations), deterministic=True)[0]
+    return observations, best
+
+
+CONVERT = ("expert", *POLE, "--convert", "model.zip", "--out", "values.npz")
+
+
+def test_a_model_is_converted_with_its_statistics(call, model):
+    observations, best = model
+    status, output, errors = call(*CONVERT, "--statistics", "statistics.pkl")
+    assert status == 0
+    assert "200 steps, with the statistics of its observations: mean return" in output
+    assert "not known" not in errors
+    assert np.array_equal(load_values("values.npz")(observations).argmax(axis=1), best)
+
+
+def test_a_model_without_statistics_is_converted_with_a_warning(call, model):
+    status, _, errors = call(*CONVERT)
+    assert status == 0
+    assert "warning: model model.zip: it is not known whether it saw normalised" in errors
+
+
+@pytest.mark.usefixtures("pole")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*POLE, "--statistics", "s.pkl"), "--statistics s.pkl: they are of a model; give --conv"),
+        ((*POLE, "--convert", "m.zip", "--check", "pole.npz"), "give one of the two"),
+        (("cliff-walking", "--convert", "m.zip"), "cliff-walking has a table, it is solved"),
+        ((*POLE, "--convert", "m.zip"), "model m.zip: there is no such file"),
+    ],
+)
+def test_conversions_that_cannot_be_are_refused(call, arguments, message):
+    status, _, errors = call("expert", *arguments)
+    assert status == 2
+    assert message in errors

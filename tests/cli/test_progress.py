@@ -13,10 +13,10 @@ def test_before_the_first_trial_it_is_the_expected_time():
 
 def test_finished_trials_correct_what_was_expected():
     """Ten times as slow as expected: more and more of it shows."""
-    told = [time_left(Before(0, 100.0), n, 100, 10.0 * n) for n in (1, 4, 96)]
-    assert told[0] == pytest.approx((0.8 * 1 + 0.2 * 10) * 99)
-    assert told[1] == pytest.approx((0.5 * 1 + 0.5 * 10) * 96)
-    assert told[2] == pytest.approx((0.04 * 1 + 0.96 * 10) * 4)
+    left = [time_left(Before(0, 100.0), n, 100, 10.0 * n) for n in (1, 4, 96)]
+    assert left[0] == pytest.approx((0.8 * 1 + 0.2 * 10) * 99)
+    assert left[1] == pytest.approx((0.5 * 1 + 0.5 * 10) * 96)
+    assert left[2] == pytest.approx((0.04 * 1 + 0.96 * 10) * 4)
 
 
 def test_trials_that_were_there_before_tell_nothing_about_the_speed():

@@ -7,6 +7,7 @@ import pytest
 
 from tests.experiments.examples import run_into
 from tests.experiments.own_files import OwnFiles
+from tests.experiments.with_ray import ALONE
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +20,15 @@ def folder(whole, tmp_path):
     """A finished run, to be spoiled."""
     shutil.copytree(whole, tmp_path / "run")
     return tmp_path / "run"
+
+
+@pytest.fixture(scope="module")
+def ray_alone():
+    """Ray talks to this machine alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in ALONE.items():
+            patch.setenv(name, value)
+        yield
 
 
 @pytest.fixture

@@ -86,7 +86,9 @@ class OwnFiles:
 
     def __init__(self, place, patch):
         self._place, self._patch = place, patch
-        self.texts = dict(zip(self.NAMES, (RULE, HELPER, LEARNER, ENVIRONMENT), strict=True))
+        self.texts: dict[str, str] = dict(
+            zip(self.NAMES, (RULE, HELPER, LEARNER, ENVIRONMENT), strict=True)
+        )
         self._number = 0
 
     def edit(self, name, old, new):

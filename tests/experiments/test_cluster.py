@@ -3,58 +3,33 @@
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import time
-import uuid
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from qbumpers.assistants import register_assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells, cluster
-from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.cluster import BATCH_SECONDS, LOCAL, RayCluster, batches, versions
+from qbumpers.experiments.cluster import LOCAL, RayCluster, versions
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
+from qbumpers.simulation.cores import usable_cores
 from tests.assistants import own_rules
 from tests.experiments.examples import cart, contents_of, settings
+from tests.experiments.with_ray import MARKS
 from tests.learners.own_learners import register_averaging
+from tests.narrowing import present
 
-# Ray leaves sockets and files to the garbage collector, and starts threads before it forks.
 pytestmark = [
-    pytest.mark.filterwarnings("ignore::ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
-    pytest.mark.filterwarnings("ignore::FutureWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
+    *MARKS,
     pytest.mark.filterwarnings("ignore::qbumpers.experts.ExpertWarning"),  # a random network
 ]
 
-# Loopback only, and nothing written to the home folder. A cluster that is not started by RayCluster
-# asks clouds whether it is one of theirs, and reports that it reports nothing: to a closed port.
-NOWHERE = "http://127.0.0.1:9"
-ALONE = {
-    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
-    "RAY_AUTH_MODE": "disabled",
-    "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_USAGE_STATS_REPORT_URL": NOWHERE,
-    "http_proxy": NOWHERE,
-    "https_proxy": NOWHERE,
-}
 MEMORY = 100_000_000
 TABLES = ("*.parquet", "cells/**/*")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def environment():
-    with pytest.MonkeyPatch.context() as patch:
-        for name, value in ALONE.items():
-            patch.setenv(name, value)
-        yield
 
 
 @pytest.fixture
@@ -134,7 +109,7 @@ def test_a_run_through_an_own_ray_equals_a_local_one_though_a_worker_is_killed(
     monkeypatch.setattr(cluster, "_finish_batch", recorded(str(log), kill_once))
     reports = []
     with RayCluster(LOCAL) as ray_cluster:
-        assert ray_cluster.cores == os.cpu_count()
+        assert ray_cluster.cores == usable_cores()
         run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=reports.append)
         with pytest.raises(RequestError, match=r"'local': this process uses Ray already"):
             RayCluster(LOCAL).__enter__()
@@ -170,7 +145,7 @@ def test_a_run_on_two_nodes_equals_a_local_one_though_a_node_is_killed_half_way(
                 made.remove_node(other, allow_graceful=False)
 
         monkeypatch.setattr(cluster, "_finish_batch", recorded(str(log), work_slowly))
-        with RayCluster(made.address) as ray_cluster:
+        with RayCluster(present(made.address)) as ray_cluster:
             assert ray_cluster.cores == 2
             run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=report)
         assert not made.worker_nodes
@@ -202,7 +177,7 @@ def test_a_cluster_without_cores_left_ends_the_run_and_the_next_goes_on(
 
         with (
             pytest.raises(ConnectionError, match=r"lost all nodes with cores|lost a batch"),
-            RayCluster(made.address) as ray_cluster,
+            RayCluster(present(made.address)) as ray_cluster,
         ):
             run_experiment(plan, tmp_path / "ray", backend=ray_cluster, report=report)
     assert contents_of(tmp_path / "ray", "cells/**/*")
@@ -259,11 +234,11 @@ def test_nodes_with_another_version_or_none_that_fits_are_refused_before_any_wor
         monkeypatch.setattr(cluster, "versions", lambda: {**here, "polars": "0.0.1"})
         message = rf"^on = '{made.address}': of its nodes, .*polars [\d.]+, not 0\.0\.1 as here$"
         with pytest.raises(RequestError, match=message):
-            RayCluster(made.address).__enter__()
+            RayCluster(present(made.address)).__enter__()
         monkeypatch.undo()
         made.add_node(num_cpus=1, object_store_memory=MEMORY, env_vars={"PYTHONPATH": tmp_path})
         with pytest.raises(RequestError, match=r"qbumpers none that fits \(No module named"):
-            RayCluster(made.address).__enter__()
+            RayCluster(present(made.address)).__enter__()
 
 
 def test_a_node_with_another_version_that_joins_later_refuses_its_work():
@@ -271,127 +246,10 @@ def test_a_node_with_another_version_that_joins_later_refuses_its_work():
         cluster._finish_batch([], [], {**versions(), "qbumpers": "9.9"})
 
 
-SCRIPT = """
-import sys
-from qbumpers.experiments.cluster import RayCluster
-from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.run import run_experiment
-from qbumpers.reproduction.experiments import reproduction
-
-def report(progress):
-    if progress.trials > 0 and trials > 1000:
-        print("begun", flush=True)
-
-trials = int(sys.argv[2])
-plan = make_plan(reproduction("cliff-walking", trials=trials))
-with RayCluster("local") as cluster:
-    import ray
-    assert [node["NodeManagerAddress"] for node in ray.nodes()] == ["127.0.0.1"]
-    run_experiment(plan, sys.argv[1], backend=cluster, report=report)
-"""
-
-
-def start_script(folder, trials):
-    """A run through an own Ray in a process of its own, with a mark that its children inherit."""
-    mark = str(uuid.uuid4())
-    environment = {**os.environ, "HOME": str(folder.parent), "MARK": mark}
-    for name in ("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "RAY_USAGE_STATS_ENABLED"):
-        del environment[name]  # what RayCluster must see to by itself
-    process = subprocess.Popen(
-        [sys.executable, "-c", SCRIPT, str(folder), str(trials)],
-        env=environment, text=True, start_new_session=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )  # fmt: skip
-    return process, f"MARK={mark}".encode()
-
-
-def processes_with(mark):
-    found = []
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        with contextlib.suppress(OSError):
-            if mark in path.read_bytes():
-                found.append(path.parent.name)
-    return found
-
-
-def wait_until_gone(mark, seconds):
-    end = time.monotonic() + seconds
-    while processes_with(mark) and time.monotonic() < end:
-        time.sleep(0.1)
-    return not processes_with(mark)
-
-
-@pytest.mark.slow
-def test_an_own_ray_prints_nothing_and_leaves_no_process_behind(tmp_path):
-    process, mark = start_script(tmp_path / "ray", 20)
-    time.sleep(2)
-    assert processes_with(mark)
-    assert process.communicate(timeout=200) == ("", "")
-    assert process.returncode == 0
-    assert wait_until_gone(mark, 5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
-def test_a_stopped_run_ends_at_once_with_all_its_processes_and_can_go_on(tmp_path, ending):
-    folder = tmp_path / "ray"
-    process, mark = start_script(folder, 5000)
-    assert process.stdout.readline() == "begun\n"
-    begun = time.monotonic()
-    os.killpg(process.pid, ending) if ending == signal.SIGINT else process.kill()
-    process.wait(timeout=60)
-    assert time.monotonic() - begun < 10
-    # Helpers of a Ray whose driver was killed first try to tell it for a minute.
-    assert wait_until_gone(mark, 15 if ending == signal.SIGINT else 150)
-    errors = process.stderr.read()
-    if ending == signal.SIGINT:
-        assert errors.rstrip().endswith("KeyboardInterrupt")
-        assert "ray" not in errors.splitlines()[0].lower()
-    finished = contents_of(folder, "cells/**/*.parquet")
-    assert finished
-    process.stdout.close()
-    process.stderr.close()
-
-
 def test_a_missing_ray_is_said_with_how_to_install_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(RequestError, match=r"Ray is not installed; pip install 'qbumpers\[ray\]'"):
         RayCluster(LOCAL).__enter__()
-
-
-durations = st.lists(st.floats(1e-4, 5.0), max_size=200)
-
-
-@given(durations=durations, cores=st.integers(1, 64))
-def test_batches_are_worth_handing_over_and_cores_end_together(durations, cores):
-    seconds = {Cell("c", i, 1): s for i, s in enumerate(sorted(durations, reverse=True))}
-    made = list(batches(seconds, cores))
-    assert [cell for batch in made for cell in batch] == list(seconds)
-    lengths = [sum(seconds[cell] for cell in batch) for batch in made]
-    longest = max(durations, default=0.0)
-    total = sum(durations)
-    for length, batch in zip(lengths, made, strict=True):
-        assert length < BATCH_SECONDS + seconds[batch[-1]]
-    for length in lengths[:-1]:
-        assert length >= min(cluster._SHORTEST_BATCH, BATCH_SECONDS)
-    loads = [0.0] * cores
-    for length in lengths:
-        loads[loads.index(min(loads))] += length
-    assert max(loads) <= total / cores * 1.25 + longest + cluster._SHORTEST_BATCH + 1e-9
-
-
-def test_long_work_is_cut_into_few_batches():
-    seconds = {Cell("c", i, 1): 0.1 for i in range(10_000)}
-    assert 500 <= len(list(batches(seconds, 2))) <= 530
-
-
-def test_batches_are_large_at_first_and_small_towards_the_end():
-    seconds = {Cell("c", i, 1): 0.01 for i in range(1_000)}
-    lengths = [len(batch) * 0.01 for batch in batches(seconds, 8)]
-    # Were the first to take twice as long as estimated, the others would still have work.
-    assert lengths[0] == pytest.approx(10 / 8 / 4, abs=0.02)
-    assert lengths == sorted(lengths, reverse=True)
-    assert max(lengths[-8:]) <= cluster._SHORTEST_BATCH + 0.011
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ import errno
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -65,7 +66,7 @@ def test_only_new_conditions_are_simulated(folder, simulated):
 
 
 def test_only_new_learners_are_simulated(tmp_path, simulated):
-    none = {"assistants": [{"name": "none"}]}
+    none: dict[str, Any] = {"assistants": [{"name": "none"}]}
     run_into(tmp_path, learners=[{"perception": "observant"}], **none)
     before = rows_of(tmp_path)
     simulated.clear()

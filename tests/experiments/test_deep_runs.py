@@ -21,7 +21,9 @@ from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
 from qbumpers.experiments.store import load
 from qbumpers.simulation import run
+from qbumpers.tasks import VectorTask
 from tests.experiments.examples import cart, cells_of, contents_of, write_toml
+from tests.narrowing import of_kind
 from tests.processes import ENVIRONMENT, PROGRAM, finish
 
 # The experts of these experiments are random networks.
@@ -169,6 +171,9 @@ class Sleeper:
     def reset(self, chance):
         time.sleep(60)
 
+    def step(self, action):
+        raise AssertionError("no episode begins")
+
 
 def as_an_experiment(plan, content):
     return list(ThisMachine(1)(plan, {Cell(content, 0, 1): 60.0}))
@@ -181,7 +186,7 @@ def as_a_simulation(plan, content):
 @pytest.mark.parametrize("work", [as_an_experiment, as_a_simulation])
 def test_a_signal_that_another_thread_receives_ends_work_at_once(tmp_path, work):
     plan = planned(tmp_path)
-    task = dataclasses.replace(plan.task, make_stepper=Sleeper)
+    task = dataclasses.replace(of_kind(VectorTask, plan.task), make_stepper=Sleeper)
     [(content, condition), *_] = plan.conditions.items()
     plan = plan._replace(task=task, conditions={content: condition._replace(task=task)})
     heard, in_time = threading.Event(), []

@@ -13,6 +13,11 @@ from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.learners.q_learning import scheduled
 from tests.experiments.examples import ids_of, settings
 
+
+def design_of(name, **options):
+    return AssistantDesign.model_validate({"name": name, **options})
+
+
 EVERYTHING = """
 name = "my-lake_2.0"
 reproduces = "cliff-walking"
@@ -112,8 +117,8 @@ def test_a_task_by_its_name_alone_is_a_task_without_arguments():
 
 
 def test_listed_options_are_swept_with_the_last_one_fastest():
-    design = AssistantDesign(
-        name="stochastic-q-bumpers", alpha=[0.4, 0.2], v_min=-5.0, second=[True, False], p_max=[0.9]
+    design = design_of(
+        "stochastic-q-bumpers", alpha=[0.4, 0.2], v_min=-5.0, second=[True, False], p_max=[0.9]
     )
     made = [assistant.options for assistant in design.assistants()]
     assert [(o.alpha, o.second) for o in made] == list(product([0.4, 0.2], [True, False]))
@@ -121,7 +126,7 @@ def test_listed_options_are_swept_with_the_last_one_fastest():
 
 
 def test_the_order_of_the_options_in_the_file_is_the_order_of_the_sweep():
-    design = AssistantDesign(name="local-q-thresholding", second=[True, False], alpha=[0.4, 0.2])
+    design = design_of("local-q-thresholding", second=[True, False], alpha=[0.4, 0.2])
     made = [(a.options.second, a.options.alpha) for a in design.assistants()]
     assert made == list(product([True, False], [0.4, 0.2]))
 
@@ -165,7 +170,7 @@ def test_an_option_that_varies_among_a_kind_is_in_its_ids_and_in_no_others():
     seconds=st.lists(st.booleans(), min_size=1, max_size=2, unique=True),
 )
 def test_ids_are_unique_and_say_what_they_stand_for(alphas, seconds):
-    design = AssistantDesign(name="local-q-thresholding", alpha=alphas, second=seconds)
+    design = design_of("local-q-thresholding", alpha=alphas, second=seconds)
     assistants = design.assistants()
     names = [condition_id(assistant, assistants) for assistant in assistants]
     assert len(set(names)) == len(alphas) * len(seconds)

@@ -1,4 +1,4 @@
-"""How long a run will take, told before it begins."""
+"""How long a run will take, said before it begins."""
 
 from time import perf_counter
 

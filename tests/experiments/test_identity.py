@@ -2,6 +2,7 @@
 
 import platform
 from dataclasses import replace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -120,7 +121,7 @@ def test_an_own_part_of_a_rule_or_learner_is_enough_to_be_the_user_s_own(own_reg
 
 
 def test_what_cannot_be_known_equals_nothing(own_registry):
-    space = {"__name__": "typed"}
+    space: dict[str, Any] = {"__name__": "typed"}
     exec("from qbumpers import Decision\ndef rule(s, n, o):\n    return Decision(0, 0.0)", space)
     register_assistant("typed", NoOptions)(space["rule"])
     first, second = identity("typed"), identity("typed")
@@ -179,7 +180,7 @@ def test_what_steps_a_vector_task_is_known_by_its_code(own_files):
 )
 def test_libraries_that_step_an_environment_are_named_with_their_versions(name, packages):
     pytest.importorskip("Box2D")
-    discount = {} if name == "lunar-lander" else {"discount": 0.9}
+    discount: dict[str, Any] = {} if name == "lunar-lander" else {"discount": 0.9}
     found = identity(learner="double-dqn", task=make_task(name, **discount))
     assert not found.parts["own"]
     assert found.allows_unmarked

@@ -8,7 +8,9 @@ from qbumpers.experiments.learner_designs import design_class
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.learners import DoubleDQN, QLearner
+from qbumpers.tasks import VectorTask
 from tests.experiments.examples import cart, settings, write_toml
+from tests.narrowing import of_kind
 from tests.values.networks import network_of
 
 DEEP, TABULAR = design_class("double-dqn"), design_class("q-learning")
@@ -53,10 +55,10 @@ def test_every_field_of_a_deep_learner_is_read_from_toml(tmp_path):
 
 
 def test_designs_without_settings_are_the_learners_without_settings():
-    assert DEEP().learner(0.99) == DoubleDQN()
-    assert TABULAR().learner(1.0) == QLearner()
-    assert DEEP().learner(0.5).discount == 0.5
-    assert DEEP(discount=0.7).learner(0.5).discount == 0.7
+    assert DEEP.model_validate({}).learner(0.99) == DoubleDQN()
+    assert TABULAR.model_validate({}).learner(1.0) == QLearner()
+    assert DEEP.model_validate({}).learner(0.5).discount == 0.5
+    assert DEEP.model_validate({"discount": 0.7}).learner(0.5).discount == 0.7
 
 
 def test_what_is_written_reads_back_as_the_same_experiment(tmp_path):
@@ -214,6 +216,6 @@ def test_a_network_of_another_shape_is_refused(tmp_path):
 def test_a_registered_task_takes_arguments():
     task = {"name": "lunar-lander", "arguments": {"seed": 5}}
     plan = make_plan(make_experiment(settings(task=task)))
-    assert plan.task.settings == {"seed": 5}
+    assert of_kind(VectorTask, plan.task).settings == {"seed": 5}
     other = make_plan(make_experiment(settings(task="lunar-lander")))
     assert plan.conditions.keys().isdisjoint(other.conditions)

@@ -15,6 +15,7 @@ from qbumpers.learners import QLearner, Schedule
 from qbumpers.simulation import simulate
 from qbumpers.tasks import cliff_walking
 from tests.experiments.examples import BUMPERS, ids_of, run_into, settings, write_toml
+from tests.narrowing import present
 
 NONE = [{"name": "none"}]
 
@@ -29,7 +30,7 @@ def test_a_listed_field_is_swept_over_with_the_last_one_fastest():
     experiment = make_experiment(settings(learners=[swept]))
     found = [(each.perception, each.penalty) for each in experiment.learners]
     assert found == list(product(["observant", "transition"], [2.0, 1.0]))
-    assert {each.initial_value for each in experiment.learners} == {3.0}
+    assert {each.learner(1.0).initial_value for each in experiment.learners} == {3.0}
 
 
 def test_every_assistant_meets_every_learner_learner_by_learner():
@@ -104,7 +105,7 @@ def test_each_learner_gets_its_own_rows_as_simulated_alone(tmp_path):
             assert rows[column].to_list() == getattr(outcomes, column).ravel().tolist()
         assert rows["learner"].unique().to_list() == ["q-learning/" + name.partition("@")[2]]
         assert rows["alpha"].unique().to_list() == [0.3]
-    assert results.states["condition"].unique(maintain_order=True).to_list() == ids
+    assert present(results.states)["condition"].unique(maintain_order=True).to_list() == ids
 
 
 def test_conditions_of_equal_content_are_simulated_once(tmp_path, monkeypatch):
@@ -214,7 +215,7 @@ def test_learners_count_towards_the_cells():
 
 
 def test_episodes_alone_count_towards_the_cells():
-    """Cells hold fewer trials where people go on alone: the same cells as the run will have."""
+    """Cells hold fewer trials if learners go on unassisted: the same cells as the run will have."""
     changes = {"episodes": 10, "retention": 49_990, "assistants": NONE}
     with pytest.raises(RequestError, match=r"1 conditions?, together 10,001 cells"):
         make_experiment(settings(trials=MANY_CELLS + 1, **changes))

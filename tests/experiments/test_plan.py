@@ -1,9 +1,8 @@
-"""Whoever makes a plan is warned, before any work, of values that say nothing about assistance."""
-
-import warnings
+"""Making a plan warns, before any work, of values that say nothing about assistance."""
 
 import pytest
 
+from qbumpers.experiments import plan
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
@@ -17,11 +16,14 @@ def test_values_no_better_than_random_play_are_warned_of_once_per_run(tmp_path):
     changes = {"values": str(tmp_path / "fall.npz"), "trials": 1, "episodes": 1}
     experiment = make_experiment(cart(tmp_path, **changes))
     with pytest.warns(ExpertWarning, match=r"task CartPole-v1: .* say nothing"):
-        plan = make_plan(experiment)
-    run_experiment(plan, tmp_path / "out")  # a second warning would be an error here
+        made = make_plan(experiment)
+    run_experiment(made, tmp_path / "out")  # a second warning would be an error here
 
 
-def test_tables_are_not_played():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        make_plan(make_experiment(settings()))
+def test_what_a_network_claims_is_tried_by_playing_and_a_table_is_not(tmp_path, monkeypatch):
+    tried = []
+    monkeypatch.setattr(plan, "check_expert", lambda task, values: tried.append(task.name))
+    make_plan(make_experiment(settings()))
+    assert tried == []
+    make_plan(make_experiment(cart(tmp_path)))
+    assert tried == ["CartPole-v1"]

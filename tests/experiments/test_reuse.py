@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,7 @@ from tests.experiments.examples import cells_of, contents_of, rows_of, settings
 BOTH = [{"name": "mine"}, {"name": "none"}]
 
 
-def continued(folder, trials=2, **changes):
+def continued(folder, trials=2, **changes: Any):
     """Trials that were there, those of each condition that were simulated now, and what is said."""
     reports, done = [], {}
     finish = work.run_condition
@@ -97,7 +98,7 @@ def test_comments_and_docstrings_change_nothing(own_files, tmp_path):
 
 
 def test_a_learner_that_was_edited_is_simulated_again(own_files, tmp_path):
-    changes = {"learners": [{"name": "own"}], "assistants": [{"name": "none"}]}
+    changes: dict[str, Any] = {"learners": [{"name": "own"}], "assistants": [{"name": "none"}]}
     own_files.register_learner()
     assert continued(tmp_path, **changes)[0] == 0
     own_files.register_learner()
@@ -111,7 +112,7 @@ def test_a_learner_that_was_edited_is_simulated_again(own_files, tmp_path):
 
 
 def test_several_conditions_that_changed_alike_are_said_in_one_line(own_files, tmp_path):
-    mine = {"assistants": [{"name": "mine", "alpha": [0.1, 0.2, 0.3]}]}
+    mine: dict[str, Any] = {"assistants": [{"name": "mine", "alpha": [0.1, 0.2, 0.3]}]}
     own_files.register_rule()
     continued(tmp_path, **mine)
     own_files.edit("own_helper", "+ 1", "+ 2")
@@ -133,7 +134,7 @@ def test_a_revision_that_was_raised_is_named(own_files, tmp_path):
 
 
 def test_a_rule_without_source_is_never_used_again_and_the_line_says_why(own_registry, tmp_path):
-    space = {"__name__": "typed"}
+    space: dict[str, Any] = {"__name__": "typed"}
     exec("def mine(s, n, o):\n    return Decision(s.proposed, 0.0)", space)
     from qbumpers import Decision
 

@@ -1,6 +1,6 @@
 """In files: tables of perception and motor noise, several kinds of learners, rules over rules."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import polars as pl
 import pytest
@@ -44,9 +44,11 @@ def test_tables_of_a_learner_reach_its_condition():
     ("learners", "apart"),
     [
         ([{"perception": ["observant", {"notices": 0.3}]}],
-         ["perception=observant", "perception=0.3..executed..0"]),
+         ["perception=observant", "perception={notices=0.3}"]),
         ([{"perception": {"notices": [0.3, 0.5], "penalty": 0.5}}],
-         ["perception=0.3..executed..0.5", "perception=0.5..executed..0.5"]),
+         ["perception={notices=0.3,penalty=0.5}", "perception={notices=0.5,penalty=0.5}"]),
+        ([{"perception": [{}, {"credits": "nothing"}]}],
+         ["perception={notices=1}", "perception={notices=1,credits=nothing}"]),
         ([{"motor": [{"slip": [0.1, 0.2]}, {"lag": 0.3}]}],
          ["motor=0.1..0", "motor=0.2..0", "motor=0..0.3"]),
         ([{}, {"motor": {"slip": 0.1}}], ["motor=0..0", "motor=0.1..0"]),
@@ -79,7 +81,10 @@ def test_what_is_wrong_in_a_table_is_named(learner, message):
 
 
 def test_sarsa_runs_beside_q_learning_and_goes_on_where_it_was(tmp_path):
-    changes = {"learners": [{"name": "q-learning"}, {"name": "sarsa"}], "assistants": NONE}
+    changes: dict[str, Any] = {
+        "learners": [{"name": "q-learning"}, {"name": "sarsa"}],
+        "assistants": NONE,
+    }
     folder = run_into(tmp_path / "out", trials=2, **changes)
     results = load(folder)
     assert ids_of(**changes) == ["none@name=q-learning", "none@name=sarsa"]

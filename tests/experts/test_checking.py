@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.experts import ExpertWarning, check_expert
+from qbumpers.experts import ExpertWarning, check_expert, train_expert
 from qbumpers.experts.checking import mean_with_error
 from qbumpers.tasks import make_task
 from qbumpers.values import shipped, shipped_expert
@@ -70,3 +70,13 @@ def test_an_expert_no_better_than_random_play_is_warned_of_with_what_follows():
         found = check_expert(task, constant(0, 4, 2))
     assert not found.better
     assert found.expert.mean == pytest.approx(9.4, abs=0.5)  # it falls over as fast as it can
+
+
+@pytest.mark.parametrize("use", [train_expert, lambda task: check_expert(task, upright)])
+def test_a_task_with_numbered_states_is_refused(use):
+    message = (
+        "task cliff-walking: its states are numbered; observations that are vectors are needed"
+    )
+    with pytest.raises(RequestError) as refused:
+        use(make_task("cliff-walking"))
+    assert str(refused.value) == message

@@ -26,7 +26,7 @@ def test_an_episode_is_what_the_environment_gives(task):
     generator = np.random.default_rng(0)
     episode = play(task, task.make_stepper(), lambda o, t: int(generator.integers(2)), 0.25)
     environment = gymnasium.make("CartPole-v1")
-    observation, _ = environment.reset(seed=2**30)
+    (observation, _), terminated = environment.reset(seed=2**30), False
     for step, action in enumerate(episode.actions):
         assert np.array_equal(episode.observations[step], observation)
         observation, reward, terminated, _, _ = environment.step(int(action))

@@ -24,7 +24,7 @@ EPISODES = 6
 
 
 def write_recording() -> None:
-    """Record one simulated person's assisted episodes, from first exploration to near-greedy."""
+    """Record one simulated learner's assisted episodes, from first exploration to near-greedy."""
     assistant = make_assistant(ASSISTANT["name"], **ASSISTANT["options"])
     steps = record(make_condition(cliff_walking(), assistant, episodes=EPISODES), seed=2019)
     episodes = [

@@ -88,7 +88,7 @@ def follow_rewards(settings, memory, transition, rates, stream):
 def choose_with_a_dictionary(settings, memory, state, rates, stream):
     """The same choices by means that Numba cannot compile."""
     products = {a: float((w * state).sum()) for a, w in enumerate(memory.weights)}
-    return max(products, key=products.get)
+    return max(products, key=products.__getitem__)
 
 
 def register_linear(name="linear", choose=best_of_observation):

@@ -37,10 +37,12 @@ def learn(settings, memory, transition, rates, stream):
     pass
 
 
-def test_it_is_told_when_it_is_registered():
-    with pytest.warns(UserWarning, match="choose returns .*, not a whole number"):
+def test_a_warning_says_so_where_it_is_registered():
+    with pytest.warns(UserWarning, match="choose returns .*, not a whole number") as caught:
         kind = register_learner(
-            "may-not-choose", Settings, start=start, choose=choose, prefer=prefer, policy=policy,
-            learn=learn,
+            "may-not-choose", Settings, start=start,
+            choose=choose,  # pyright: ignore[reportArgumentType] - this is what is refused
+            prefer=prefer, policy=policy, learn=learn,
         )  # fmt: skip
+    assert caught[0].filename == __file__
     assert not learner_for_settings(kind).compiled

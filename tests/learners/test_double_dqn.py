@@ -39,7 +39,7 @@ def stream(name="test"):
     return trial_streams(0, name, range(1))[0, LEARNER]
 
 
-def made(network, precision=np.float64, **changes):
+def made(network, precision: type[np.floating] = np.float64, **changes):
     """A learner, its layout, and a memory whose target network differs from its network."""
     learner = DoubleDQN(network=network, **changes)
     layout = network.layout(INPUTS, ACTIONS)
@@ -114,7 +114,7 @@ def test_a_thousand_updates_stay_together(clip):
     assert np.abs(memory.target - memory.parameters).max() > 1e-3
 
 
-# Sums of products are rounded once where the compiled learner's are, so that bits can be compared.
+# Sums of products are rounded once wherever the compiled learner's are: bits can be compared.
 @numba.njit(error_model="numpy")
 def fused_adam(parameters, moments, gradient, rate, updates):
     """Adam in float32 without any flush."""

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners import PERCEPTIONS, Perception, perceive, perception
 from qbumpers.learners.perception import believed
@@ -57,7 +58,7 @@ def test_who_credits_the_own_action_with_an_undone_step_believes_that_it_led_bac
     experience = read(named(name), PROPOSED, undone=True)
     assert experience.led_back == led_back
     transition = believed(experience, 7, 9, True)
-    # Where it led back, nothing ended; where it is seen to have led on, that would have ended.
+    # If it led back, nothing ended; if it is seen to have led on, that would have ended.
     expected = (7, 7, False) if led_back else (7, 9, True)
     assert (transition.state, transition.next_state, transition.terminated) == expected
 
@@ -96,7 +97,7 @@ def test_compiled_and_interpreted_agree_with_the_plain_table(
     step = SimpleNamespace(proposed=proposed, executed=executed, undone=undone, reward=reward)
     expected = learned_from((notices, credit, penalty), **vars(step), coin=coin)
     numbers = as_numbers(Perception(notices, credit, penalty))
-    for function in (perceive, perceive.py_func):
+    for function in (perceive, uncompiled(perceive)):
         found = function(numbers, **vars(step), coin=coin)
         if expected is None:
             assert found.action == -1

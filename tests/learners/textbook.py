@@ -4,6 +4,7 @@ import numpy as np
 import torch
 
 from qbumpers.networks.network import named_parameters
+from tests.narrowing import present
 
 ACTIVATIONS = {"tanh": torch.tanh, "relu": torch.relu}
 
@@ -37,7 +38,7 @@ class TextbookNetwork:
         return np.concatenate([p.detach().numpy().ravel() for p in self.parameters.values()])
 
     def gradient(self):
-        return np.concatenate([p.grad.numpy().ravel() for p in self.parameters.values()])
+        return np.concatenate([present(p.grad).numpy().ravel() for p in self.parameters.values()])
 
     def copy_from(self, other):
         with torch.no_grad():
@@ -81,7 +82,9 @@ class TextbookLearner:
         parameters = list(self.online.parameters.values())
         groups = {"global": [parameters], "variable": [[p] for p in parameters], "none": []}
         for group in groups[self.learner.clip]:
-            norm = torch.sqrt(sum((p.grad**2).sum() for p in group))
+            norm = torch.sqrt(
+                sum(((p.grad**2).sum() for p in group), torch.zeros((), dtype=torch.float64))
+            )
             for parameter in group:
                 if norm > limit:
                     parameter.grad *= limit / norm

@@ -20,12 +20,17 @@ from qbumpers.reproduction.printed import (
 NAN = float("nan")
 
 
+def how_often_they_agree(printed, measured):
+    pairs = zip(printed, measured, strict=True)
+    return sum(agrees(mean, 0.0, mean_interval(sample)) is True for mean, sample in pairs)
+
+
 def test_two_samples_of_one_truth_agree_99_times_in_100():
     generator = np.random.default_rng(99)
     repetitions, trials = 10_000, 100
     printed = generator.normal(-200.0, 60.0, (repetitions, trials)).mean(axis=1)
     measured = generator.normal(-200.0, 60.0, (repetitions, trials))
-    agreed = sum(agrees(p, 0.0, mean_interval(m)) for p, m in zip(printed, measured, strict=True))
+    agreed = how_often_they_agree(printed, measured)
     # Four standard errors of a share of 0.99 among 10,000: 4 * 0.001; that the spread is itself
     # an estimate, of 100 trials, moves the share by less than 0.001 more.
     assert agreed / repetitions == pytest.approx(0.99, abs=0.005)
@@ -36,7 +41,7 @@ def test_samples_of_truths_six_errors_apart_seldom_agree():
     apart = 6 * 60.0 * np.sqrt(2 / 100)
     printed = generator.normal(-200.0, 60.0, (1000, 100)).mean(axis=1)
     measured = generator.normal(-200.0 + apart, 60.0, (1000, 100))
-    agreed = sum(agrees(p, 0.0, mean_interval(m)) for p, m in zip(printed, measured, strict=True))
+    agreed = how_often_they_agree(printed, measured)
     assert agreed <= 5  # a difference 3.4 errors below its mean: a chance of about 4e-4 each
 
 

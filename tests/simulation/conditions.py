@@ -7,9 +7,17 @@ from qbumpers.learners import QLearner, Schedule
 from qbumpers.simulation import make_condition
 from qbumpers.tasks import TabularTask, cliff_walking, make_task
 from qbumpers.values import TabularValues
-from tests.assistants.own_rules import TakeBackOptions, take_back
+from tests.assistants.own_rules import (
+    NoOptions,
+    TakeBackOptions,
+    follow_signs,
+    no_sign,
+    remember_signs,
+    take_back,
+)
 
 BUMPERS = ("stochastic-q-bumpers", {"alpha": 0.7, "second": True})
+MISLED = ("stochastic-q-bumpers", {"alpha": 0.6, "v_min": -3.0, "p_max": 0.9, "clip": False})
 THRESHOLDS = ("local-q-thresholding", {"alpha": 0.0195, "second": True})
 
 
@@ -21,7 +29,7 @@ def on_the_cliff(assistant, *, episodes=12, **settings):
 
 
 def taken_back(*, tolerance=1.5, **settings):
-    """On the cliff with a rule that undoes; it stays registered."""
+    """On the cliff with a rule that undoes, registered for this test."""
     register_assistant("take-back", TakeBackOptions, needs=("undo",))(take_back)
     return on_the_cliff(("take-back", {"tolerance": tolerance}), **settings)
 
@@ -33,10 +41,11 @@ def on_slippery_ice(**settings):
     return make_condition(task, assistant, episodes=40, learner=learner, **settings)
 
 
-def in_a_random_world(**settings):
+def in_a_random_world(assistant=MISLED, *, seen=None, **settings):
     """Nine states, three actions, three outcomes of each, several starts; values that mislead.
 
-    Task, values and learner each have a discount of their own.
+    Task, values and learner each have a discount of their own. `seen` is what the assistant sees of
+    each state, int [9].
     """
     generator = np.random.default_rng(20190722)
     shape = (9, 3, 3)
@@ -56,6 +65,7 @@ def in_a_random_world(**settings):
         episode_limit=25,
         success=generator.random(shape) < 0.1,
         crash=generator.random(shape) < 0.1,
+        seen=seen,
     )
     values = TabularValues(generator.normal(2, 1, (9, 3)), 0.7, task.name, "drawn at random")
     learner = QLearner(
@@ -67,8 +77,21 @@ def in_a_random_world(**settings):
     usual = {"learner": learner, "perception": "transition-disruption", "penalty": 0.75}
     return make_condition(
         task,
-        make_assistant("stochastic-q-bumpers", alpha=0.6, v_min=-3.0, p_max=0.9, clip=False),
+        make_assistant(assistant[0], **assistant[1]),
         values=values,
         episodes=30,
         **{**usual, **settings},
     )
+
+
+PAIRS = np.array([4, 0, 0, 1, 1, 2, 2, 3, 3])
+"""States of the random world that look alike to the assistant."""
+
+
+def half_seen(**settings):
+    """A random world of whose states pairs look alike, with a rule that goes by what it is told.
+
+    The rule stays registered.
+    """
+    register_assistant("signs", NoOptions, start=no_sign, observe=remember_signs)(follow_signs)
+    return in_a_random_world(("signs", {}), seen=PAIRS, **settings)

@@ -2,6 +2,7 @@
 
 import functools
 
+import gymnasium
 import numpy as np
 
 from qbumpers.assistants import make_assistant
@@ -55,11 +56,15 @@ class Corridor:
         return np.array([self._place / 6, 1.0, self._steps / 10], np.float32)
 
 
+def no_environment(*, render_mode: str | None = None) -> gymnasium.Env:
+    raise AssertionError("simulators need none")
+
+
 def corridor(**settings) -> VectorTask:
     return VectorTask(
         name="corridor",
         make_stepper=functools.partial(Corridor, **settings),
-        make_environment=Corridor,
+        make_environment=no_environment,
         observation_size=3,
         actions=2,
         discount=0.9,

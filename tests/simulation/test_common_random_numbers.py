@@ -150,7 +150,7 @@ def neighbours():
 
 
 def fisher_z(first, second):
-    """Correlation on a scale where its standard error is 1 / sqrt(N - 3)."""
+    """Correlation on a scale in which its standard error is 1 / sqrt(N - 3)."""
     return np.arctanh(np.corrcoef(first, second)[0, 1]) * np.sqrt(TRIALS - 3)
 
 

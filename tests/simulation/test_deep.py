@@ -172,8 +172,8 @@ def test_trials_do_not_depend_on_their_company_or_on_processes():
 def test_common_random_numbers_begin_every_episode_alike():
     settings = {"common_random_numbers": True, "episodes": 6}
     none = in_the_corridor(**settings)
-    helped = in_the_corridor("maximal", **settings)
-    first, second = (record(c) for c in (none, helped))
+    assisted = in_the_corridor("maximal", **settings)
+    first, second = (record(c) for c in (none, assisted))
     for episode in range(6):
         begins = [np.argmax(steps.episode == episode) for steps in (first, second)]
         np.testing.assert_array_equal(first.state[begins[0]], second.state[begins[1]])
@@ -212,7 +212,7 @@ def test_records_tell_the_decisions_by_the_assistants_rule():
     condition = in_the_corridor(*BUMPERS, episodes=20)
     steps = record(condition)
     assert steps.state.shape == steps.next_state.shape == (len(steps.episode), 3)
-    earned, discount = 0.0, 1.0
+    earned, discount, start_value = 0.0, 1.0, 0.0
     for i in range(len(steps.episode)):
         if i == 0 or steps.episode[i] != steps.episode[i - 1]:
             earned, discount, start_value = 0.0, 1.0, condition.values(steps.state[i]).max()

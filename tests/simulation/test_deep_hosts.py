@@ -40,7 +40,7 @@ def test_the_wrapper_repeats_a_simulated_session(name, options):
             noise = list(zip(steps.coin[here], steps.tie[here], strict=True))
             observation, _ = shared.reset(options={"noise": noise})
             np.testing.assert_array_equal(observation, steps.state[here][0])
-            rows = []
+            rows, ended = [], False
             for proposed in steps.proposed[here]:
                 observation, _, ended, _, info = shared.step(int(proposed))
                 rows.append(info["assistance"])

@@ -1,5 +1,6 @@
 """Rules from outside the package run through the same loops."""
 
+import os
 from typing import NamedTuple
 
 import pytest
@@ -20,6 +21,7 @@ from tests.assistants.own_rules import (
 )
 from tests.reference_simulation import ReferenceTrial
 from tests.simulation.conditions import on_the_cliff
+from tests.simulation.corridors import in_the_corridor
 
 pytestmark = pytest.mark.usefixtures("own_registry")
 
@@ -55,6 +57,55 @@ def test_a_rule_that_cannot_be_compiled_gives_the_same_numbers_and_one_warning()
     # Warnings are errors from here on: the simulation repeats none.
     interpreted = run(on_the_cliff(("guide", {}), episodes=3), trials=2, workers=2).outcomes
     assert_same(interpreted, compiled)
+
+
+def elsewhere(rule):
+    """The same rule, which refuses to decide in this process."""
+    here = os.getpid()
+
+    def decide(*arguments):
+        assert os.getpid() != here
+        return rule(*arguments)
+
+    return decide
+
+
+def register_plain(decide):
+    with pytest.warns(UserWarning, match="'guide' cannot be compiled"):
+        register_assistant("guide", NoOptions)(decide)
+    return "guide", {}
+
+
+def register_with_memory(decide):
+    def guide_while_any_left(situation, noise, options, memory):
+        assert memory > 0
+        return decide(situation, noise, options)
+
+    with pytest.warns(UserWarning, match="'budget' cannot be compiled"):
+        register_assistant("budget", BudgetOptions, start=full_budget, observe=spend)(
+            guide_while_any_left
+        )
+    return "budget", {"budget": 10_000}
+
+
+@pytest.mark.parametrize("register", [register_plain, register_with_memory])
+def test_an_own_rule_reaches_the_processes_that_step_a_task_in_python(register):
+    """On numbers that the assistants share, maximal assistance written again does the same."""
+    own = in_the_corridor(*register(elsewhere(guide_with_a_dictionary)), common_random_numbers=True)
+    found = run(own, trials=3, seed=4, workers=2).outcomes
+    expected = run(in_the_corridor("maximal", common_random_numbers=True), trials=3, seed=4)
+    assert_same(found, expected.outcomes)
+    assert found.overrides.any()
+    with pytest.raises(AssertionError):
+        run(own, trials=1)
+
+
+@pytest.mark.slow
+def test_an_own_rule_is_compiled_in_the_processes_that_step_a_task_in_python():
+    register_assistant("guide", NoOptions)(guide)
+    own = in_the_corridor("guide", common_random_numbers=True)
+    expected = run(in_the_corridor("maximal", common_random_numbers=True), trials=3, seed=4)
+    assert_same(run(own, trials=3, seed=4, workers=2).outcomes, expected.outcomes)
 
 
 def options_class():

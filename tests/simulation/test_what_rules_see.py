@@ -1,5 +1,6 @@
-"""What rules are told, the same in every host, and what they ask of a task."""
+"""What rules see, the same in every host, and what they ask of a task."""
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from tests.simulation.corridors import in_the_corridor
 pytestmark = pytest.mark.usefixtures("own_registry")
 
 GOAL = 47
+SCALE = 2.0**-30
+"""Makes a probability of what is told, to the bit."""
 STEERED = np.random.default_rng(1).integers(0, 4, (48, 4)).astype(float)
 COMFORT = np.random.default_rng(2).integers(0, 8, (48, 4)) / 8
 
@@ -37,9 +40,9 @@ class Further:
 
 def tell(situation, noise, options):
     """Executes what the first further row says; its probability tells all the rest."""
-    told = 1e6 * situation.state + 1e4 * situation.episode + 10 * situation.step
-    told += situation.others[1, situation.proposed]
-    return Decision(int(situation.others[0, situation.proposed]), told)
+    seen = 1e6 * situation.state + 1e4 * situation.episode + 10 * situation.step
+    seen += situation.others[1, situation.proposed]
+    return Decision(int(situation.others[0, situation.proposed]), seen * SCALE)
 
 
 def simulated():
@@ -47,12 +50,12 @@ def simulated():
     return on_the_cliff(("tell", {}), values=Further(), episodes=5)
 
 
-def assert_told(steps):
+def assert_all_seen(steps):
     """Recounted from the table of steps alone."""
     number = np.arange(len(steps.episode)) - np.searchsorted(steps.episode, steps.episode)
     at = (steps.state, steps.proposed)
-    told = 1e6 * steps.state + 1e4 * steps.episode + 10 * number + COMFORT[at]
-    assert np.array_equal(steps.probability, told)
+    expected = 1e6 * steps.state + 1e4 * steps.episode + 10 * number + COMFORT[at]
+    assert np.array_equal(steps.probability, expected * SCALE)
     assert np.array_equal(steps.executed, STEERED[at])
     assert number.max() > 20
 
@@ -60,7 +63,7 @@ def assert_told(steps):
 def test_a_simulated_rule_knows_where_it_is_and_reads_its_rows_in_its_order():
     condition = simulated()
     assert condition.assistant.compiled
-    assert_told(record(condition, seed=2))
+    assert_all_seen(record(condition, seed=2))
 
 
 def test_the_wrapper_tells_the_same():
@@ -69,7 +72,7 @@ def test_the_wrapper_tells_the_same():
     actions = np.random.default_rng(3).integers(4, size=120)
     for _ in range(3):
         rows += [Step(**step[-1]["assistance"]) for step in play(environment, actions)[1:]]
-    assert_told(Step(*(np.array(column) for column in zip(*rows, strict=True))))
+    assert_all_seen(Step(*(np.array(column) for column in zip(*rows, strict=True))))
 
 
 def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
@@ -82,6 +85,20 @@ def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
     model = simulated().model()
     with pytest.raises(RequestError, match=message):
         Session(assistant, CLIFF, model)
+
+
+def test_values_and_further_rows_are_those_of_what_is_seen():
+    register_assistant("tell", NoOptions, values=("safety", "comfort"))(tell)
+    seen = np.random.default_rng(4).integers(0, 48, 48)
+    task = dataclasses.replace(cliff_walking(), seen=seen)
+    condition = make_condition(task, make_assistant("tell"), values=Further())
+    assert np.array_equal(condition.values, CLIFF.table[seen])
+    assert np.array_equal(condition.others, np.stack([STEERED, COMFORT], axis=1)[seen])
+    steps = record(condition, seed=2)
+    states = task.next_state[steps.state, steps.executed, 0]
+    assert np.array_equal(steps.next_state, states)  # the record tells what the learner sees
+    told = (steps.probability / SCALE // 1e6).astype(int)
+    assert np.array_equal(told, seen[steps.state])
 
 
 class Told(NamedTuple):
@@ -101,10 +118,10 @@ def keep_note(memory, step, options):
 
 
 def read_note(situation, noise, options, memory):
-    return Decision(situation.proposed, memory.number)
+    return Decision(situation.proposed, memory.number * SCALE)
 
 
-def test_start_is_told_the_task():
+def test_start_gets_the_task():
     # 48 states, 4 actions, no action that does nothing, discount 1; down from above the cliff leads
     # to the start, 36, for -100; every two actions are equally far apart.
     expected = 48e6 + 4e3 - 1 + 36 / 64 - 1000 + 1 / 1024 + 1.0
@@ -112,10 +129,10 @@ def test_start_is_told_the_task():
         read_note
     )
     steps = record(on_the_cliff(("note", {}), episodes=1))
-    assert set(steps.probability) == {expected}
+    assert set(steps.probability) == {expected * SCALE}
     environment = walking("note")
     environment.reset()
-    assert environment.step(0)[-1]["assistance"]["probability"] == expected
+    assert environment.step(0)[-1]["assistance"]["probability"] == expected * SCALE
 
 
 NEEDS = {

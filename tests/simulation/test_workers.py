@@ -13,7 +13,7 @@ ROLLUP = Path("/proc/self/smaps_rollup")
 
 def memory(_):
     """Bytes of this process, and those that it alone has."""
-    sizes = dict.fromkeys(("Rss", "Private_Clean", "Private_Dirty"), 0)
+    sizes: dict[str, int] = dict.fromkeys(("Rss", "Private_Clean", "Private_Dirty"), 0)
     for line in ROLLUP.read_text().splitlines()[1:]:
         name, size = line.split()[:2]
         if name[:-1] in sizes:

@@ -1,5 +1,7 @@
 """A pilot for the lunar lander, and Gymnasium's own lander on the terrain of a test."""
 
+from typing import Any
+
 import numpy as np
 from gymnasium.envs.box2d.lunar_lander import LunarLander
 
@@ -10,7 +12,7 @@ class OriginalLander:
     """Gymnasium's class, begun anew on the same terrain; RandomState is the paper's generator."""
 
     def __init__(self, seed, render_mode=None):
-        self.environment = LunarLander(render_mode=render_mode)
+        self.environment: Any = LunarLander(render_mode=render_mode)
         self.seed = seed
 
     def reset(self):

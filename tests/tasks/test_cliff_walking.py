@@ -3,10 +3,12 @@
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.toy_text import CliffWalkingEnv
 from gymnasium.utils.env_checker import check_env
 
 import qbumpers  # noqa: F401 - registers the environment
 from qbumpers.tasks import CliffWalking, cliff_walking
+from tests.narrowing import of_kind, present
 from tests.tasks.examples import outcomes
 
 UP, RIGHT, DOWN, LEFT = range(4)
@@ -52,12 +54,12 @@ def test_every_move_does_what_the_description_says(cell, action):
     task = cliff_walking()
     to, reward, terminated = described(cell, action)
     assert outcomes(task, number(cell), action) == {(number(to), reward, terminated): 1.0}
-    assert bool(task.success[number(cell), action, 0]) == (to == GOAL)
-    assert bool(task.crash[number(cell), action, 0]) == (reward == -100)
+    assert bool(present(task.success)[number(cell), action, 0]) == (to == GOAL)
+    assert bool(present(task.crash)[number(cell), action, 0]) == (reward == -100)
 
 
 def test_it_is_gymnasiums_cliff_walking_plus_100_at_the_goal():
-    table = gymnasium.make("CliffWalking-v1").unwrapped.P
+    table = of_kind(CliffWalkingEnv, gymnasium.make("CliffWalking-v1").unwrapped).P
     task = cliff_walking()
     for cell in WALKABLE:
         for action in range(4):
@@ -85,11 +87,11 @@ def test_an_episode_along_the_cliff_returns_87():
         _, reward, terminated, truncated, info = environment.step(action)
         assert not terminated
         assert not truncated
-        total += reward
+        total += float(reward)
     observation, reward, terminated, truncated, info = environment.step(DOWN)
     assert (observation, reward, terminated, truncated) == (number(GOAL), 99.0, True, False)
     assert info == {"success": True, "crash": False}
-    assert total + reward == 87.0
+    assert total + float(reward) == 87.0
 
 
 def test_a_fall_is_a_crash_and_the_episode_goes_on():
@@ -137,14 +139,14 @@ def orange_cells(picture: np.ndarray) -> set[tuple[int, int]]:
 def test_the_picture_has_an_orange_walker_that_moves():
     environment = gymnasium.make("qbumpers/CliffWalking-v0", render_mode="rgb_array")
     environment.reset(seed=0)
-    picture = environment.render()
+    picture = of_kind(np.ndarray, environment.render())
     assert picture.shape == (256, 768, 3)
     assert picture.dtype == np.uint8
     assert orange_cells(picture) == {START}
     environment.step(UP)
-    assert orange_cells(environment.render()) == {(2, 0)}
+    assert orange_cells(of_kind(np.ndarray, environment.render())) == {(2, 0)}
     environment.step(RIGHT)
-    assert orange_cells(environment.render()) == {(2, 1)}
+    assert orange_cells(of_kind(np.ndarray, environment.render())) == {(2, 1)}
 
 
 def test_without_a_render_mode_nothing_is_drawn():

@@ -6,10 +6,18 @@ import gymnasium
 import numpy as np
 import pytest
 
-from qbumpers.tasks.display import Display, circle, line, polygon, rectangle, text
+from qbumpers.tasks.display import (
+    Display,
+    circle,
+    line,
+    polygon,
+    rectangle,
+    text,
+    unassisted_step,
+)
 from qbumpers.tasks.displays.by_environment import display_maker
-from qbumpers.tasks.drawing import picture
-from tests.tasks.shown import display_of, environment_of, middle, near
+from qbumpers.tasks.drawing import Painter, picture
+from tests.tasks.shown import ENVIRONMENTS, display_of, environment_of, middle, near
 
 RED, BLUE, WHITE = "#ff0000", "#0000ff", "#ffffff"
 
@@ -79,6 +87,38 @@ def test_later_shapes_lie_over_earlier_ones_and_over_the_backdrop():
     ])  # fmt: skip
     seen = picture(display, None)
     assert [seen[40, x].tolist() for x in (5, 35, 50)] == [[255, 0, 0], [255] * 3, [0, 0, 255]]
+
+
+@pytest.mark.parametrize("height", [None, 90])
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_pictures_over_a_kept_backdrop_are_those_drawn_all_at_once(name, height):
+    display, environment = display_of(name), environment_of(name)
+    at_once = display._replace(
+        backdrop=[], scene=lambda *shown: [*display.backdrop, *display.scene(*shown)]
+    )
+    painter = Painter(display, height)
+    environment.action_space.seed(0)
+    state, _ = environment.reset(seed=0)
+    step = None
+    for _ in range(5):
+        assert np.array_equal(painter.picture(state, step), picture(at_once, state, step, height))
+        before, action = state, environment.action_space.sample()
+        state, reward, *_ = environment.step(action)
+        step = unassisted_step(before, int(action), float(reward), state)
+
+
+@pytest.mark.parametrize("name", ["qbumpers/CliffWalking-v0", "qbumpers/LunarLander-v0"])
+def test_an_environment_shows_where_it_is_now(name):
+    environment = gymnasium.make(name, render_mode="rgb_array")
+    state, _ = environment.reset(seed=0)
+    assert np.array_equal(np.asarray(environment.render()), picture(display_of(name), state))
+    for action in (0, 2, 1):
+        before = state
+        state, reward, *_ = environment.step(action)
+        step = unassisted_step(before, action, float(reward), state)
+        assert np.array_equal(
+            np.asarray(environment.render()), picture(display_of(name), state, step)
+        )
 
 
 @pytest.mark.parametrize("state", [0, 17, 26, 36, 47])

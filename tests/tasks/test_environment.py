@@ -7,6 +7,7 @@ from gymnasium.utils.env_checker import check_env
 
 from qbumpers import RequestError
 from qbumpers.tasks import TabularEnvironment, TabularTask, make_task
+from tests.narrowing import of_kind
 from tests.tasks.examples import outcomes, random_task
 
 
@@ -21,7 +22,7 @@ def test_spaces_are_as_large_as_the_task():
 
 
 def test_outcomes_are_as_frequent_as_their_probabilities():
-    task = make_task("FrozenLake-v1", discount=0.99, is_slippery=True)
+    task = of_kind(TabularTask, make_task("FrozenLake-v1", discount=0.99, is_slippery=True))
     environment = TabularEnvironment(task)
     actions = np.random.default_rng(0).integers(4, size=60_000)
     counts: dict[tuple[int, int], dict[tuple[int, float, bool], int]] = {}

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qbumpers import RequestError
+from qbumpers import RequestError, solve
 from qbumpers.tasks import TabularTask
+from tests.narrowing import present
 from tests.tasks.examples import outcomes, random_task
 
 TRANSITION = np.array([[[0.25, 0.75], [0.0, 1.0]], [[1.0, 0.0], [0.5, 0.5]]])
@@ -61,8 +62,8 @@ def test_arrays_mean_what_they_say(seed, states, actions, by_next_state, spread)
 def test_flags_of_states_mark_the_outcomes_that_enter_them():
     task = from_arrays(success=[False, True], crash=[True, False])
     possible = task.probability > 0
-    assert (task.success[possible] == (task.next_state == 1)[possible]).all()
-    assert (task.crash[possible] == (task.next_state == 0)[possible]).all()
+    assert (present(task.success)[possible] == (task.next_state == 1)[possible]).all()
+    assert (present(task.crash)[possible] == (task.next_state == 0)[possible]).all()
     assert from_arrays().success is None
     assert from_arrays().crash is None
 
@@ -82,10 +83,11 @@ def test_tables_mean_what_they_say():
 
 def test_endings_that_pay_are_successes_and_the_others_crashes():
     task = from_table()
-    assert task.success[0, 0].tolist() == [False, True]
-    assert task.crash[0, 0].tolist() == [False, False]
-    assert task.crash[0, 1].tolist() == [True, False]
-    assert task.success[1, 0].tolist() == task.crash[1, 0].tolist() == [False, False]
+    success, crash = present(task.success), present(task.crash)
+    assert success[0, 0].tolist() == [False, True]
+    assert crash[0, 0].tolist() == [False, False]
+    assert crash[0, 1].tolist() == [True, False]
+    assert success[1, 0].tolist() == crash[1, 0].tolist() == [False, False]
 
 
 def test_success_is_unknown_where_no_ending_pays():
@@ -103,7 +105,7 @@ def test_given_judges_decide_alone():
 
     task = from_table(crash=judge)
     assert task.success is None
-    assert np.argwhere(task.crash).tolist() == [[1, 0, 0]]
+    assert np.argwhere(present(task.crash)).tolist() == [[1, 0, 0]]
     assert seen == {
         (s, a, to, reward, ends)
         for s, actions in TABLE.items()
@@ -208,3 +210,45 @@ def test_the_digest_changes_with_the_behaviour(changes):
 def test_success_and_crash_have_different_digests():
     flags = [False, True]
     assert from_arrays(success=flags).digest() != from_arrays(crash=flags).digest()
+
+
+@pytest.mark.parametrize("states", [3, 7, 100])
+def test_probabilities_rounded_to_float32_are_those_that_were_meant(states):
+    generator = np.random.default_rng(states)
+    exact = generator.dirichlet(np.ones(states), (states, 2))
+    rounded = exact.astype(np.float32)
+    assert (rounded.sum(axis=2, dtype=np.float64) != 1).any()
+    reward = generator.normal(size=(states, 2))
+    terminal = np.arange(states) == states - 1
+    made = [
+        TabularTask.from_arrays(each, reward, terminal, 0, discount=0.99, episode_limit=10)
+        for each in (exact, rounded)
+    ]
+    np.testing.assert_allclose(made[1].probability.sum(axis=2), 1, rtol=1e-12)
+    values = [np.array([solve(task)(state) for state in range(states)]) for task in made]
+    np.testing.assert_allclose(values[1], values[0], atol=1e-4)
+
+
+def test_a_sum_is_shown_with_all_its_digits():
+    transition = np.array([[[0.999998, 0.0], [1.0, 0.0]], [[0.0, 1.0], [0.0, 1.0]]])
+    with pytest.raises(RequestError, match=r"sums to 0\.999998; it must sum to 1"):
+        from_arrays(transition=transition)
+
+
+def test_a_fraction_is_no_next_state_of_a_table():
+    table = {**TABLE, 1: {**TABLE[1], 0: [(1.0, 0.5, 0.0, False)]}}
+    with pytest.raises(RequestError, match=r"table\[1\]\[0\]: next state = 0\.5; a whole number"):
+        from_table(table)
+
+
+def test_fractions_are_no_next_states():
+    task = random_task(0, 3, 2)
+    with pytest.raises(RequestError, match="next_state holds float64; whole numbers are needed"):
+        dataclasses.replace(task, next_state=task.next_state + 0.5)
+
+
+@pytest.mark.parametrize("field", ["terminated", "success", "crash"])
+def test_a_half_truth_is_refused(field):
+    task = random_task(0, 3, 2)
+    with pytest.raises(RequestError, match=f"{field} must hold nothing but true and false"):
+        dataclasses.replace(task, **{field: np.full(task.next_state.shape, 0.5)})

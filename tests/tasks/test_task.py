@@ -8,7 +8,9 @@ import pytest
 from gymnasium import spaces
 
 from qbumpers import RequestError
-from qbumpers.tasks import CliffWalking, cliff_walking, make_task
+from qbumpers.learners import learners
+from qbumpers.tasks import CliffWalking, VectorTask, cliff_walking, make_task
+from tests.narrowing import of_kind
 from tests.tasks.examples import random_task
 
 LAKE = {"name": "FrozenLake-v1", "discount": 0.99, "is_slippery": True}
@@ -50,8 +52,6 @@ def test_a_table_says_what_it_is():
     assert (task.no_op, task.has_distance, task.seen) == (-1, False, None)
     assert task.display.actions == ("action 0", "action 1", "action 2")
     assert task.distance.tolist() == [[0, 1, 1], [1, 0, 1], [1, 1, 0]]
-    assert task.learners == ("q-learning", "sarsa", "expected-sarsa")
-    assert task.value_sources == ("exact", "q-learning")
     assert task.releases_gil
     assert task.undoable
 
@@ -62,12 +62,16 @@ def test_a_vector_task_says_what_it_is(cart):
     assert (cart.no_op, cart.has_distance, cart.seen) == (-1, False, None)
     assert cart.display.actions == ("left", "right")
     assert cart.distance.tolist() == [[0, 1], [1, 0]]
-    assert cart.learners == ("double-dqn",)
-    assert cart.value_sources == ("expert",)
     assert cart.start.shape == (0,)
     assert not cart.releases_gil
     with pytest.raises(RequestError, match="CartPole-v1 has no table of transitions"):
         cart.dynamics()
+
+
+def test_the_learners_of_a_task_are_those_that_observe_what_it_shows(cart):
+    for task, observed in ((random_task(0, 5, 3), "states"), (cart, "vectors")):
+        suiting = {n for n, k in learners().items() if k.built_in and k.observes == observed}
+        assert set(task.learners) == suiting
 
 
 def test_events_are_those_that_are_announced(cart):
@@ -135,7 +139,7 @@ def test_what_is_stated_of_a_vector_task_is_in_its_digest(cart):
 
 
 def test_what_follows_from_a_tasks_name_is_in_its_digest_only_if_it_is_changed():
-    lander = make_task("lunar-lander")
+    lander = of_kind(VectorTask, make_task("lunar-lander"))
     changes = [
         {"no_op": -1},
         {"action_distance": None},

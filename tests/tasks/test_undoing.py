@@ -6,10 +6,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces, wrappers
+from gymnasium.envs.registration import EnvSpec, WrapperSpec
 
 from qbumpers import RequestError, make_task
 from qbumpers.tasks import TabularEnvironment, VectorTask, cliff_walking
+from qbumpers.tasks.stepping import GymnasiumStepper
 from qbumpers.tasks.undoing import reached_limit, undo_of
+from tests.narrowing import of_kind
 from tests.tasks.examples import random_task
 
 LANDER = "qbumpers/LunarLander-v0"
@@ -53,9 +56,9 @@ class Echo(gymnasium.Wrapper):
         return observation, info
 
     def step(self, action):
-        observation, *rest = self.env.step(action)
+        observation, reward, terminated, truncated, info = self.env.step(action)
         echoed, self.before = observation + self.before, observation
-        return echoed, *rest
+        return echoed, reward, terminated, truncated, info
 
 
 class UndoableEcho(Echo):
@@ -76,11 +79,27 @@ class HalfEcho(Echo):
         return self.before
 
 
-class Negated(wrappers.TransformObservation):
-    """A wrapper of a user, made from one of Gymnasium's."""
+class RunningSum(wrappers.TransformObservation):
+    """A wrapper of a user, derived from one of Gymnasium's, with a state of its own."""
 
     def __init__(self, env):
-        super().__init__(env, lambda observation: -observation, env.observation_space)
+        super().__init__(env, self._added, env.observation_space)
+        self.sum = np.zeros(1, np.float32)
+
+    def _added(self, observation):
+        self.sum = self.sum + observation
+        return self.sum
+
+
+class UndoableRunningSum(RunningSum):
+    """The same with the two methods."""
+
+    def snapshot(self):
+        return self.sum, undo_of(self.env)[0]()
+
+    def restore(self, snapshot):
+        self.sum = snapshot[0]
+        undo_of(self.env)[1](snapshot[1])
 
 
 HARMLESS = [
@@ -88,12 +107,17 @@ HARMLESS = [
     wrappers.OrderEnforcing,
     functools.partial(wrappers.TimeLimit, max_episode_steps=50),
     wrappers.RecordEpisodeStatistics,
-    functools.partial(wrappers.TransformReward, func=lambda reward: 2 * reward),
+    functools.partial(wrappers.TransformReward, func=lambda reward: 2 * float(reward)),
     functools.partial(wrappers.ClipReward, min_reward=0),
     functools.partial(
         wrappers.TransformAction, func=lambda action: 1 - action, action_space=spaces.Discrete(2)
     ),
-    Negated,
+    functools.partial(
+        wrappers.TransformObservation,
+        func=lambda observation: -observation,
+        observation_space=Counter.observation_space,
+    ),
+    UndoableRunningSum,
     UndoableEcho,
 ]
 
@@ -128,6 +152,7 @@ def test_a_step_is_taken_back_through_several_wrappers():
     ("wrap", "name"),
     [
         (Echo, "Echo"),
+        (RunningSum, "RunningSum"),
         (HalfEcho, "HalfEcho"),
         (functools.partial(wrappers.DelayObservation, delay=1), "DelayObservation"),
         (functools.partial(wrappers.FrameStackObservation, stack_size=2), "FrameStackObservation"),
@@ -217,10 +242,10 @@ def test_a_task_finds_out_whether_its_steps_can_be_undone():
     plain = VectorTask.from_gymnasium("Counter-v0", discount=0.9)
     assert not plain.undoable
     with pytest.raises(RequestError, match="environment Counter has no methods snapshot"):
-        plain.make_stepper().snapshot()
+        of_kind(GymnasiumStepper, plain.make_stepper()).snapshot()
     task = VectorTask.from_gymnasium("UndoableCounter-v0", discount=0.9)
     assert task.undoable
-    stepper = task.make_stepper()
+    stepper = of_kind(GymnasiumStepper, task.make_stepper())
     stepper.reset(0.5)
     stepper.step(0)
     before = stepper.snapshot()
@@ -232,8 +257,8 @@ def test_a_task_finds_out_whether_its_steps_can_be_undone():
 @pytest.mark.usefixtures("counters")
 def test_steps_cannot_be_undone_if_a_wrapper_of_the_environment_keeps_something():
     spec = gymnasium.spec("UndoableCounter-v0")
-    echo = gymnasium.envs.registration.WrapperSpec("Echo", f"{__name__}:Echo", {})
-    gymnasium.registry["Counter-v0"] = gymnasium.envs.registration.EnvSpec(
+    echo = WrapperSpec("Echo", f"{__name__}:Echo", {})
+    gymnasium.registry["Counter-v0"] = EnvSpec(
         "Counter-v0", spec.entry_point, max_episode_steps=9, additional_wrappers=(echo,)
     )
     assert not VectorTask.from_gymnasium("Counter-v0", discount=0.9).undoable

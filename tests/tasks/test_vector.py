@@ -3,15 +3,18 @@
 import dataclasses
 import functools
 import pickle
+from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium import spaces
+from gymnasium import spaces, wrappers
+from gymnasium.envs.registration import EnvSpec
 
 from qbumpers import RequestError, make_task
 from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
+from tests.narrowing import of_kind, present
 
 
 class Corridor(gymnasium.Env):
@@ -38,7 +41,7 @@ class Corridor(gymnasium.Env):
 @pytest.fixture
 def corridor():
     """The name of a registered environment of the tests."""
-    gymnasium.register("Corridor-v0", entry_point=Corridor)
+    gymnasium.register("Corridor-v0", entry_point=f"{__name__}:Corridor")
     yield "Corridor-v0"
     del gymnasium.registry["Corridor-v0"]
 
@@ -47,6 +50,7 @@ def corridor():
 def test_a_stepper_is_the_environment_itself(name):
     stepper = VectorTask.from_gymnasium(name, discount=0.99).make_stepper()
     environment = gymnasium.make(name)
+    actions = of_kind(spaces.Discrete, environment.action_space).n
     generator = np.random.default_rng(0)
     for chance in generator.random(5):
         observation, _ = environment.reset(seed=int(chance * 2**32))
@@ -54,7 +58,7 @@ def test_a_stepper_is_the_environment_itself(name):
         while not ended:
             assert mine.dtype == np.float32
             assert np.array_equal(mine, observation)
-            action = int(generator.integers(environment.action_space.n))
+            action = int(generator.integers(actions))
             observation, reward, terminated, truncated, _ = environment.step(action)
             mine, my_reward, events = stepper.step(action)
             assert (my_reward, events) == (reward, TERMINATED * terminated)
@@ -68,7 +72,7 @@ def test_sizes_and_limits_are_the_environments():
     assert not task.has_crash
     shorter = VectorTask.from_gymnasium("CartPole-v1", discount=0.9, episode_limit=30)
     assert shorter.episode_limit == 30
-    assert shorter.make_environment().spec.max_episode_steps == 30
+    assert present(shorter.make_environment().spec).max_episode_steps == 30
 
 
 def test_the_step_limit_is_left_to_the_simulator():
@@ -166,3 +170,64 @@ def test_arguments_that_no_file_can_keep_are_refused(corridor):
         VectorTask.from_gymnasium(
             corridor, discount=0.9, episode_limit=9, actions=spaces.Discrete(2, start=5)
         )
+
+
+NORMALISING = {
+    "NormalizeObservation": wrappers.NormalizeObservation.wrapper_spec(),
+    "NormalizeReward": wrappers.NormalizeReward.wrapper_spec(),
+}
+
+
+def made_from(kind: Any) -> Any:
+    """An entry point, by any name that the type checker takes."""
+    return kind
+
+
+@pytest.fixture
+def wrapped(corridor):
+    """Registers the corridor with a wrapper, and forgets it."""
+
+    def register(spec, **arguments):
+        gymnasium.register(
+            "Wrapped-v0", entry_point=made_from(Corridor), max_episode_steps=9,
+            additional_wrappers=(spec,), kwargs=arguments,
+        )  # fmt: skip
+        return "Wrapped-v0"
+
+    yield register
+    del gymnasium.registry["Wrapped-v0"]
+
+
+@pytest.mark.parametrize("name", NORMALISING)
+def test_a_wrapper_that_remembers_earlier_episodes_is_refused(wrapped, name):
+    message = f"'Wrapped-v0': an episode went another way when .*is it wrapper {name}"
+    with pytest.raises(RequestError, match=message):
+        make_task(wrapped(NORMALISING[name]), discount=0.9)
+
+
+def test_a_wrapper_that_remembers_nothing_is_part_of_the_environment(wrapped):
+    tenfold = wrappers.TransformReward.wrapper_spec(func=lambda reward: 10 * reward)
+    stepper = make_task(wrapped(tenfold), discount=0.9).make_stepper()
+    stepper.reset(0.5)
+    assert stepper.step(1)[1] == 10.0
+
+
+class Unseeded(Corridor):
+    """Draws from a generator that no seed reaches."""
+
+    def reset(self, *, seed=None, options=None):
+        observation, info = super().reset(seed=seed)
+        return observation + np.random.default_rng().random(), info
+
+
+def test_chance_that_no_seed_reaches_is_refused(monkeypatch):
+    spec = EnvSpec("Unseeded-v0", made_from(Unseeded), max_episode_steps=9)
+    monkeypatch.setitem(gymnasium.registry, "Unseeded-v0", spec)
+    with pytest.raises(RequestError, match="'Unseeded-v0': an episode went another way") as caught:
+        make_task("Unseeded-v0", discount=0.9)
+    assert "wrapper" not in str(caught.value)
+
+
+def test_its_actions_are_numbered_as_the_environments(corridor):
+    task = make_task(corridor, discount=0.9, episode_limit=5)
+    assert task.action_space == spaces.Discrete(2, start=5)

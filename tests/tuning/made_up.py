@@ -1,4 +1,4 @@
-"""Made-up people, whose means are known and who take no time."""
+"""Made-up learners, whose means are known and who take no time."""
 
 import numpy as np
 import polars as pl

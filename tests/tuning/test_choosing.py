@@ -13,6 +13,7 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments.sources import make_experiment
 from qbumpers.tuning import tune
 from tests.experiments.examples import settings
+from tests.narrowing import present
 from tests.tuning.made_up import planned, tuned, verdicts
 
 
@@ -25,8 +26,9 @@ def test_the_best_teacher_above_the_floor_is_chosen(tmp_path, seed):
     ]  # fmt: skip
     assert found.contenders[3].verdict in {"teaches worse", "kept to the end"}
     assert found.choice is found.contenders[2]
-    assert found.choice.condition == "stochastic-q-bumpers/alpha=0.3"
-    assert found.choice.assistant.options.alpha == 0.3
+    choice = present(found.choice)
+    assert choice.condition == "stochastic-q-bumpers/alpha=0.3"
+    assert choice.assistant.options.alpha == 0.3
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -43,7 +45,7 @@ def test_what_is_said_of_the_choice_rests_on_fresh_trials_alone(tmp_path):
     for estimate, values in zip(found.contenders[1][3:5], samples.T, strict=True):
         interval = scipy.stats.t.interval(0.9, 29, values.mean(), scipy.stats.sem(values))
         np.testing.assert_allclose(estimate, [values.mean(), *interval])
-    assert found.choice.confidence == 0.9
+    assert present(found.choice).confidence == 0.9
 
 
 def test_what_is_said_of_the_others_rests_on_their_trials_of_the_race(tmp_path):
@@ -90,9 +92,10 @@ def test_the_files_say_what_was_found(tmp_path):
     described = tomllib.loads((tmp_path / "tuning.toml").read_text())
     assert (described["floor"], described["confidence"]) == (0.0, 0.95)
     assert (described["trials"], described["grid_trials"]) == (found.trials, 90)
-    assert described["choice"] == found.choice.condition
+    choice = present(found.choice)
+    assert described["choice"] == choice.condition
     again = make_experiment(settings(assistants=described["assistants"]))
-    assert again.conditions()[0].assistant.options == found.choice.assistant.options
+    assert again.conditions()[0].assistant.options == choice.assistant.options
 
 
 @pytest.mark.parametrize(

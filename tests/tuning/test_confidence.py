@@ -1,6 +1,7 @@
 """Stated confidence, by simulation; and the whole grid of Cliff Walking."""
 
 import os
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.reproduction.experiments import reproduction
 from qbumpers.simulation import run
 from qbumpers.tuning import tune
+from tests.narrowing import present
 from tests.tuning.made_up import tuned
 
 
@@ -30,7 +32,7 @@ def test_intervals_of_the_choice_cover_as_often_as_they_say(tmp_path):
     for seed in range(repeats):
         means = [(3, 0)] * 8
         found, _ = tuned(tmp_path / str(seed), means, seed=seed, trials=10, confidence=0.8)
-        _, low, high = found.choice.unassisted
+        _, low, high = present(found.choice).unassisted
         misses += not low <= 0 <= high
     # Three standard deviations of a count with probability 0.2.
     assert abs(misses - 0.2 * repeats) < 3 * np.sqrt(repeats * 0.2 * 0.8)
@@ -65,7 +67,9 @@ def test_cliff_walking_is_tuned_with_a_third_of_the_trials_of_its_grid(tmp_path,
         if bound > floor:
             grid[named.condition] = outcomes.unassisted_return.mean(axis=1)
     best = max(grid, key=lambda condition: grid[condition].mean())
-    chosen = grid[found.choice.condition]
-    if found.choice.condition != best:
-        test = scipy.stats.ttest_ind(chosen, grid[best], equal_var=False, alternative="less")
+    chosen = present(found.choice).condition
+    if chosen != best:
+        test: Any = scipy.stats.ttest_ind(
+            grid[chosen], grid[best], equal_var=False, alternative="less"
+        )
         assert test.pvalue > 0.05

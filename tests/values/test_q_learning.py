@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from qbumpers import QLearner, RequestError, Schedule, TabularTask, learn_values, solve
-from qbumpers.tasks import cliff_walking
+from qbumpers.tasks import cliff_walking, make_task
 from tests.tasks.examples import chain
 
 
@@ -91,3 +91,8 @@ def test_numbers_out_of_range_are_refused():
         learn_values(cliff_walking(), episodes=0)
     with pytest.raises(RequestError, match="seed = -1; it must not be negative"):
         learn_values(cliff_walking(), seed=-1)
+
+
+def test_a_task_without_a_table_is_refused():
+    with pytest.raises(RequestError, match="task CartPole-v1 has no table of transitions"):
+        learn_values(make_task("CartPole-v1", discount=0.9))

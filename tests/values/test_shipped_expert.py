@@ -12,7 +12,7 @@ LANDER = "qbumpers/LunarLander-v0"
 
 
 def lands(expert, environment, generator, epsilon):
-    """Whether an episode in the environment for people ends in a landing."""
+    """Whether an episode in the environment for participants ends in a landing."""
     observation, _ = environment.reset()
     while True:
         action = int(np.argmax(expert(observation)))

@@ -11,6 +11,7 @@ import qbumpers
 from qbumpers import RequestError, TabularValues, load_values, solve
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import check_width
+from tests.narrowing import of_kind
 
 TABLE = np.array([[1.5, -2.0, 0.0], [4.0, 5.0, 1 / 3]])
 
@@ -57,7 +58,7 @@ def test_a_number_that_is_not_finite_is_named(number):
 
 
 def test_a_file_gives_back_the_values_and_where_they_came_from(saved):
-    loaded = load_values(saved)
+    loaded = of_kind(TabularValues, load_values(saved))
     assert loaded.table.tobytes() == TABLE.tobytes()
     assert (loaded.discount, loaded.task, loaded.method) == (0.9, "a task", "by hand")
     assert loaded.version == qbumpers.__version__
@@ -79,7 +80,8 @@ def test_saving_leaves_one_file_under_the_very_name(tmp_path):
     values().save(tmp_path / "named.values")
     values(table=TABLE + 1).save(tmp_path / "named.values")
     assert [path.name for path in tmp_path.iterdir()] == ["named.values"]
-    assert load_values(tmp_path / "named.values").table.tolist() == (TABLE + 1).tolist()
+    loaded = of_kind(TabularValues, load_values(tmp_path / "named.values"))
+    assert loaded.table.tolist() == (TABLE + 1).tolist()
 
 
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(saved, monkeypatch):
@@ -142,6 +144,15 @@ def test_an_archive_with_other_contents_is_refused(tmp_path, content):
     np.savez(tmp_path / "other.npz", **content)
     with pytest.raises(RequestError, match="not a file of Q values"):
         load_values(tmp_path / "other.npz")
+
+
+def test_a_file_of_another_version_that_cannot_be_read_names_it(tmp_path):
+    provenance = {"version": "99.0.0", "colour": "red", "sha256": ""}
+    np.savez(tmp_path / "new.npz", table=TABLE, provenance=np.array(json.dumps(provenance)))
+    with pytest.raises(
+        RequestError, match=rf"by qbumpers 99\.0\.0, .* {qbumpers.__version__} .*col"
+    ):
+        load_values(tmp_path / "new.npz")
 
 
 @pytest.mark.parametrize("field", ["table", "discount"])

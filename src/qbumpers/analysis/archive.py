@@ -55,7 +55,7 @@ def archive_run(folder: str | Path, into: str | Path, choose: Choose) -> None:
     """Archive the trials of a run, and the curves of a few conditions, as CSV.
 
     Args:
-        folder: of the finished run.
+        folder: output folder of a finished run.
         into: folder for the files; made if it is missing.
         choose: the conditions whose curves are archived, from the table of trials.
 
@@ -85,7 +85,7 @@ def load_archive(folder: str | Path) -> Archive:
     """What `archive_run` wrote.
 
     Args:
-        folder: of the files.
+        folder: where `archive_run` put its files.
 
     Raises:
         RequestError: if a file is missing.
@@ -106,7 +106,7 @@ def archive_trials(folders: Mapping[str, str | Path], into: str | Path) -> None:
     """Archive the trials of several runs in one table, `RUNS`, with the name of each run.
 
     Args:
-        folders: of finished runs, by name.
+        folders: output folders of finished runs, by the name that each run gets in the table.
         into: folder for the file; made if it is missing.
 
     Raises:
@@ -120,7 +120,7 @@ def trials_of_runs(folders: Mapping[str, str | Path]) -> pl.DataFrame:
     """The trials of several runs in one table.
 
     Args:
-        folders: of finished runs, by name.
+        folders: output folders of finished runs, by the name that each run gets in the table.
 
     Returns:
         A row per run and trial: run, and the columns of `trial_measures`.

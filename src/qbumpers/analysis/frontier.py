@@ -200,9 +200,11 @@ def matched_regret(
     resampled = resampled_means(list(samples.values()), generator, paired, resamples)
 
     def reached(points: np.ndarray) -> np.ndarray:
+        """The method's other measure, [...], at the baseline's level; points are [..., C, 2]."""
         return at_matched(points[..., ours, :], _standing(points, theirs, axis)[..., axis], axis)
 
     def reduction(points: np.ndarray) -> np.ndarray:
+        """The share of the baseline's regret that the method is without; NaN if there is none."""
         best = points[..., 1 - axis].max(axis=-1)
         gap = best - _standing(points, theirs, axis)[..., 1 - axis]
         return 1 - (best - reached(points)) / np.where(gap > 0, gap, np.nan)

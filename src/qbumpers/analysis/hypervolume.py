@@ -99,13 +99,16 @@ def compare_hypervolumes(
     resampled = resampled_means(list(samples.values()), generator, paired, resamples)
 
     def covered(method: str, points: np.ndarray) -> np.ndarray:
+        """The area [...] that a method's conditions cover, of all points [..., C, 2]."""
         return hypervolume(points[..., places[method], :], below)
 
     def estimated(method: str) -> IntervalEstimate:
+        """That area at the means, with its interval; an area is never negative."""
         found = function_interval(lambda points: covered(method, points), means, resampled)
         return found._replace(low=max(found.low, 0.0))  # NaN stays
 
     def advantage(first: str, second: str) -> Advantage:
+        """How much more one method covers, and in which share of resamples it covers more."""
         found = function_interval(
             lambda points: covered(first, points) - covered(second, points), means, resampled
         )

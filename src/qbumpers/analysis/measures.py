@@ -163,7 +163,7 @@ def summary(
 
     Args:
         trials: from `trial_measures`.
-        options: of each condition, by its id.
+        options: for each condition, by its id, the options of its assistant by name.
         episodes: of training, per trial.
         retention: further episodes without the assistant, per trial.
 

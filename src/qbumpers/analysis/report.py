@@ -55,7 +55,7 @@ def write_report(
     there, and this one does not write, is removed.
 
     Args:
-        folder: of the run.
+        folder: output folder of the run, a path or a URL.
         advance: called with the name of each part before it is made.
         add: finds what is to be added; the reports of published experiments have
             `qbumpers.reproduction.report.additions`.
@@ -91,7 +91,7 @@ def find(results: Results, add: Add = nothing) -> Findings:
     """Every table of a report and what they say in sentences.
 
     Args:
-        results: of the run.
+        results: what the run's output folder holds.
         add: finds what is to be added.
     """
     trials = trial_measures(results.episodes, results.experiment.criterion)

@@ -103,7 +103,7 @@ def function_interval(
         function: of means float64 [..., C, M], returning float64 [...]; NaN if it has no value.
         means: float64 [C, M], of the samples themselves.
         resampled: float64 [B, C, M], from `resampled_means`.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         The function at the means; no interval if it has no value at more than 1% of the
@@ -144,7 +144,7 @@ def stratified_interval(
         generator: draws the resamples.
         paired: draw the same trials in all conditions (common random numbers).
         resamples: how many.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         The statistic of all samples; no interval for a single trial.

@@ -21,7 +21,7 @@ class IntervalEstimate(NamedTuple):
     """A number with an interval.
 
     Attributes:
-        mean: the estimate.
+        mean: the number that the samples give.
         low: lower end of the interval; NaN if it is unknown.
         high: upper end.
     """
@@ -35,7 +35,7 @@ class Difference(NamedTuple):
     """How much larger one mean is than another.
 
     Attributes:
-        estimate: the difference with its interval.
+        estimate: first minus second mean, with its interval.
         p_value: of the two-sided t test of no difference; NaN if it is unknown.
     """
 
@@ -55,7 +55,7 @@ def mean_interval(samples: np.ndarray, confidence: float = CONFIDENCE) -> Interv
 
     Args:
         samples: float64 [T], one per trial.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         The mean, and mean -+ t standard errors; no interval for a single sample.
@@ -73,7 +73,7 @@ def difference(
         first: float64 [T], one per trial.
         second: float64 [U], one per trial; [T] in the same order if paired.
         paired: whether trials of equal place belong together (common random numbers).
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         First minus second. If neither condition varies, the interval has no width and the
@@ -125,7 +125,7 @@ def probability_of_improvement(
         first: float64 [T], one per trial.
         second: float64 [U], one per trial; [T] in the same order if paired.
         paired: compare trials of equal place only, instead of every trial with every other.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         P(first > second) + P(first = second) / 2; no interval for a single trial.
@@ -182,7 +182,7 @@ def bonferroni(comparisons: int, confidence: float = CONFIDENCE) -> float:
 
     Args:
         comparisons: how many intervals.
-        confidence: of all of them together.
+        confidence: with which all of them are to hold at once, in (0, 1).
 
     Returns:
         The confidence to ask of each.
@@ -195,7 +195,7 @@ def interquartile_mean(samples: np.ndarray, axis: int = -1) -> np.ndarray:
 
     Args:
         samples: float64 [..., T, ...].
-        axis: of the trials.
+        axis: along which the T trials lie.
 
     Returns:
         float64, without that axis.
@@ -221,7 +221,7 @@ def bootstrap_interval(
         method: "BCa" (Efron, JASA, 1987) or "percentile".
         paired: whether trials of equal place are drawn together.
         resamples: how many.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         The statistic; no interval for a single trial, one without width if no condition varies.
@@ -254,7 +254,7 @@ def percentile_interval(
     Args:
         estimate: from the samples themselves.
         replicates: float64 [B]; NaN if a replicate has no value.
-        confidence: of the interval.
+        confidence: that the interval is to have, in (0, 1).
 
     Returns:
         The estimate; no interval if more than 1% of the replicates have no value.

@@ -7,15 +7,8 @@ from qbumpers.assistants import (  # in the order in which they are listed
     none,
     stochastic_q_bumpers,
 )
-from qbumpers.assistants.registry import (
-    Assistant,
-    Options,
-    Rule,
-    assistant_of,
-    assistants,
-    make_assistant,
-    register_assistant,
-)
+from qbumpers.assistants.assistant import Assistant, assistant_of, make_assistant
+from qbumpers.assistants.registry import Options, Rule, assistants, register_assistant
 
 __all__ = [
     "Assistant",

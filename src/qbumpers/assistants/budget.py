@@ -26,7 +26,7 @@ class BudgetMemory(NamedTuple):
     """What a budget remembers.
 
     Attributes:
-        of: the memory of the other rule.
+        of: what the other rule remembers; 0 if that is nothing.
         episode: the episode in which overrides were spent.
         spent: overrides in that episode.
     """

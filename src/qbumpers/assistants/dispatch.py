@@ -13,7 +13,7 @@ from numba.extending import overload
 
 from qbumpers.assistants.registry import Rule, is_options, rule_for_options
 from qbumpers.compilation import INLINE, compiled_for_session, uncompiled
-from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+from qbumpers.decisions import Decision, Model, Noise, Situation, Step, checked_decision
 
 
 def decide(situation: Situation, noise: Noise, options: Any, memory: Any) -> Decision:
@@ -21,8 +21,8 @@ def decide(situation: Situation, noise: Noise, options: Any, memory: Any) -> Dec
     rule = rule_for_options(type(options))
     function = uncompiled(rule.decide)
     if rule.start is None:
-        return function(situation, noise, options)
-    return function(situation, noise, options, memory)
+        return checked_decision(function(situation, noise, options), rule.name)
+    return checked_decision(function(situation, noise, options, memory), rule.name)
 
 
 def start(options: Any, model: Model) -> Any:
@@ -39,7 +39,7 @@ def observe(memory: Any, step: Step, options: Any) -> Any:
 
 def undoes(decision: Decision) -> bool:
     """Whether a decision takes the state back after the action."""
-    return decision.undo
+    return bool(decision.undo)
 
 
 def declined(decision: Decision, proposed: int) -> Decision:
@@ -82,7 +82,7 @@ def _compiled_observe(memory: Any, step: Any, options: Any) -> Any:
 @overload(undoes, strict=False, jit_options=INLINE)
 def _compiled_undoes(decision: Any) -> Any:
     if decision.count == 3:
-        return lambda decision: decision.undo
+        return lambda decision: bool(decision.undo)
     return lambda decision: False
 
 

@@ -14,7 +14,7 @@ class LocalQThresholdingOptions(NamedTuple):
     """Options of Local Q-Thresholding.
 
     Attributes:
-        alpha: share of the range of values within which the person is free; 1 never overrides.
+        alpha: share of the range of values within which the learner is free; 1 never overrides.
         second: override with the second-best action instead of the best.
     """
 

@@ -1,4 +1,4 @@
-"""No assistance: the person's action is always executed."""
+"""No assistance: the proposed action is always executed."""
 
 from typing import NamedTuple
 

@@ -35,7 +35,7 @@ class StochasticQBumpersOptions(NamedTuple):
 
 
 def check_floor(options: StochasticQBumpersOptions, start_value: float) -> None:
-    """Raise ValueError where `v_min` leaves no room below V*(s_0)."""
+    """Raise ValueError if `v_min` is not below V*(s_0)."""
     if not options.v_min < start_value:
         raise ValueError(
             f"v_min = {options.v_min:g} must be below the value of the start state, "
@@ -61,7 +61,7 @@ def override_probability(lost: float, room: float, p_max: float, clip: bool) -> 
         clip: no override at ratio 0 or less, a sure one at ratio 1 or more.
 
     Returns:
-        f(lost / room), clipped outside (0, 1) where `clip` is set; 1 where there is no room.
+        f(lost / room), clipped outside (0, 1) if `clip` is set; 1 if nothing may be lost.
     """
     if room <= 0:
         return 1.0

@@ -1,6 +1,10 @@
 """The command line. Exit status: 0 done, 1 it failed, 2 the request was wrong."""
 
-from qbumpers.cli import experiments, expert, listing, tuning  # noqa: F401  their commands register
+# Their commands register.
+from qbumpers.cli import experiments as experiments
+from qbumpers.cli import expert as expert
+from qbumpers.cli import listing as listing
+from qbumpers.cli import tuning as tuning
 from qbumpers.cli.application import application, main
 
 __all__ = ["application", "main"]

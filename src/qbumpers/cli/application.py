@@ -4,17 +4,32 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
-from typing import Annotated
+import warnings
+from collections.abc import Generator
+from typing import Annotated, Any
 
 import typer
 from rich.text import Text
+from typer.core import TyperGroup
 
 import qbumpers
-from qbumpers.cli.console import ERRORS, OUTPUT
+from qbumpers.cli.console import ERRORS, OUTPUT, print_in_any_encoding, print_warning
 from qbumpers.errors import RequestError
 
+
+class _Commands(TyperGroup):
+    """The commands; one that meets the end of a file too early says so, and is not "Aborted"."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """See Click, which takes the end of a file for that of a person's typing."""
+        try:
+            return super().invoke(ctx)
+        except EOFError as error:
+            raise RuntimeError(f"a file ends too early: {error}") from error
+
+
 application = typer.Typer(
+    cls=_Commands,
     name="qbumpers",
     help="Assistance that lets people learn: simulate it, compare it, reproduce the paper.",
     no_args_is_help=True,
@@ -38,8 +53,11 @@ def _main_options(
 
 def main() -> None:
     """Run the command line and exit with its status."""
+    print_in_any_encoding()
     try:
-        application()
+        with warnings.catch_warnings():
+            warnings.showwarning = print_warning
+            application()
     except RequestError as error:
         _stop(2, "error", str(error))
     except OSError as error:
@@ -52,7 +70,7 @@ def main() -> None:
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable() -> Generator[None, None, None]:
     """End at once on Ctrl-C or SIGTERM, with a message; Typer would end without one."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -1,9 +1,13 @@
 """What the command line prints, and how numbers look there."""
 
+import codecs
 import contextlib
+import io
 import math
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Generator
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -13,17 +17,47 @@ from qbumpers.analysis.formatting import decimals_for
 
 OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
 
+_SPELT = str.maketrans({
+    "α": "alpha", "±": "+-", "≤": "<=", "\N{MINUS SIGN}": "-", "\N{EN DASH}": "-",
+    "\N{NO-BREAK SPACE}": " ", "\N{HORIZONTAL ELLIPSIS}": "...",
+})  # fmt: skip
+
+
+def spelt_out(error: UnicodeError) -> tuple[bytes, int]:
+    """What is printed in place of characters that an encoding does not have, for `codecs`."""
+    assert isinstance(error, UnicodeEncodeError)
+    spelt = error.object[error.start : error.end].translate(_SPELT)
+    try:
+        return spelt.encode("ascii", "surrogateescape"), error.end  # bytes of a path, as they came
+    except UnicodeEncodeError:
+        return spelt.encode("ascii", "backslashreplace"), error.end
+
+
+codecs.register_error("spelt-out", spelt_out)
+
+
+def print_in_any_encoding() -> None:
+    """Have standard output and errors spell out what their encoding does not have."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="spelt-out")
+
+
+def print_warning(message: Warning | str, *_: Any) -> None:
+    """A warning in one line; in place of `warnings.showwarning`."""
+    ERRORS.print(f"warning: {escape(str(message))}", soft_wrap=True)
+
 
 @contextlib.contextmanager
-def expert_warnings_printed() -> Iterator[None]:
-    """Print warnings about action values that are no better than random play, a line each."""
+def expert_warnings_printed() -> Generator[None, None, None]:
+    """Print warnings about action values, a line each."""
     from qbumpers.experts import ExpertWarning
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ExpertWarning)
         yield
     for warning in caught:
-        ERRORS.print(f"warning: {escape(str(warning.message))}", soft_wrap=True)
+        print_warning(warning.message)
 
 
 def table(*columns: str) -> Table:

@@ -27,51 +27,55 @@ if TYPE_CHECKING:
     from qbumpers.experiments.run import RunProgress
 
 
+Profile = Annotated[
+    str,
+    typer.Option(
+        help="Setting of the experiment. 'figures': in which the paper's figure comes out. Others "
+        "of cliff-walking: 'text', which takes the paper's text literally. Others of lunar-lander, "
+        "to see what its result depends on: 'dueling', 'learning-rate-5e-4', 'long-exploration', "
+        "'relu'.",
+        metavar="figures|text|...",
+    ),
+]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="A version of lunar-lander that takes a few minutes.")
+]
+Trials = Annotated[
+    int | None,
+    typer.Option(help="Simulated learners per condition.", show_default="the paper's", metavar="N"),
+]
+Episodes = Annotated[
+    int | None, typer.Option(help="Of each trial.", show_default="the paper's", metavar="N")
+]
+Alphas = Annotated[
+    str | None,
+    typer.Option(
+        help="Of every assistant that has an alpha, for example 0.5,0.8,1.",
+        show_default="the paper's",
+        metavar="A,A,...",
+    ),
+]
+Values = Annotated[
+    str | None,
+    typer.Option(
+        help="Q values of the assistants: a file, for example another expert.",
+        show_default="the profile's",
+        metavar="PATH",
+    ),
+]
+
+
 @application.command()
 def reproduce(
     experiment: Annotated[
         str, typer.Argument(help="Which one: cliff-walking or lunar-lander.", metavar="EXPERIMENT")
     ],
-    profile: Annotated[
-        str,
-        typer.Option(
-            help="Setting of the experiment. 'figures': in which the paper's figure comes out. "
-            "Others of cliff-walking: 'text', which takes the paper's text literally. Others of "
-            "lunar-lander, to see what its result depends on: 'dueling', 'learning-rate-5e-4', "
-            "'long-exploration', 'relu'.",
-            metavar="figures|text|...",
-        ),
-    ] = "figures",
-    quick: Annotated[
-        bool,
-        typer.Option("--quick", help="A version of lunar-lander that takes a few minutes."),
-    ] = False,
-    trials: Annotated[
-        int | None,
-        typer.Option(
-            help="Simulated learners per condition.", show_default="the paper's", metavar="N"
-        ),
-    ] = None,
-    episodes: Annotated[
-        int | None,
-        typer.Option(help="Of each trial.", show_default="the paper's", metavar="N"),
-    ] = None,
-    alphas: Annotated[
-        str | None,
-        typer.Option(
-            help="Of every assistant that has an alpha, for example 0.5,0.8,1.",
-            show_default="the paper's",
-            metavar="A,A,...",
-        ),
-    ] = None,
-    values: Annotated[
-        str | None,
-        typer.Option(
-            help="Q values of the assistants: a file, for example another expert.",
-            show_default="the profile's",
-            metavar="PATH",
-        ),
-    ] = None,
+    profile: Profile = "figures",
+    quick: Quick = False,
+    trials: Trials = None,
+    episodes: Episodes = None,
+    alphas: Alphas = None,
+    values: Values = None,
     seed: Annotated[int, typer.Option(help="Of all random streams.", metavar="N")] = 0,
     workers: Workers = None,
     on: On = None,

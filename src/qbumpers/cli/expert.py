@@ -19,8 +19,54 @@ if TYPE_CHECKING:
     from qbumpers.experts import Recipe
     from qbumpers.experts.checking import MeanWithError
     from qbumpers.experts.choosing import Judgement
-    from qbumpers.tasks import TabularTask
-    from qbumpers.tasks.vector import VectorTask
+    from qbumpers.tasks import Task
+
+
+Check = Annotated[
+    Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
+]
+Convert = Annotated[
+    Path | None,
+    typer.Option(
+        help="Convert this DQN of Stable-Baselines3 in place of training.", metavar="MODEL.zip"
+    ),
+]
+Statistics = Annotated[
+    Path | None,
+    typer.Option(help="The file of VecNormalize that goes with --convert.", metavar="FILE.pkl"),
+]
+Figures = Annotated[
+    Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
+]
+Out = Annotated[
+    Path | None, typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE")
+]
+Corrected = Annotated[
+    Path | None,
+    typer.Option(
+        help="Also correct the values by what they achieve where learners go, into this file.",
+        metavar="FILE",
+    ),
+]
+Discount = Annotated[
+    float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
+]
+Seeds = Annotated[
+    int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
+]
+Steps = Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)]
+Activation = Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")]
+Hidden = Annotated[str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")]
+LearningRate = Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")]
+RandomStart = Annotated[
+    int,
+    typer.Option(
+        "--random-start",
+        "--opening",
+        help="Random actions before each episode of training.",
+        metavar="N",
+    ),
+]
 
 
 @application.command()
@@ -28,45 +74,19 @@ def expert(
     task: Annotated[
         str, typer.Argument(help="Name of a task, or of a Gymnasium environment.", metavar="TASK")
     ],
-    check: Annotated[
-        Path | None, typer.Option(help="Only check the values in this file.", metavar="FILE")
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(help="Draw what the check finds into this folder.", metavar="DIR")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Where the values go.", show_default="TASK.npz", metavar="FILE"),
-    ] = None,
-    corrected: Annotated[
-        Path | None,
-        typer.Option(
-            help="Also correct the values by what they achieve where learners go, into this file.",
-            metavar="FILE",
-        ),
-    ] = None,
-    discount: Annotated[
-        float | None,
-        typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER"),
-    ] = None,
-    seeds: Annotated[
-        int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
-    ] = 10,
-    steps: Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)] = 400_000,
-    activation: Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")] = "tanh",
-    hidden: Annotated[
-        str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")
-    ] = "64,64",
-    learning_rate: Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")] = 5e-4,
-    random_start: Annotated[
-        int,
-        typer.Option(
-            "--random-start",
-            "--opening",
-            help="Random actions before each episode of training.",
-            metavar="N",
-        ),
-    ] = 50,
+    check: Check = None,
+    convert: Convert = None,
+    statistics: Statistics = None,
+    figures: Figures = None,
+    out: Out = None,
+    corrected: Corrected = None,
+    discount: Discount = None,
+    seeds: Seeds = 10,
+    steps: Steps = 400_000,
+    activation: Activation = "tanh",
+    hidden: Hidden = "64,64",
+    learning_rate: LearningRate = 5e-4,
+    random_start: RandomStart = 50,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 
@@ -76,14 +96,19 @@ def expert(
     equals, after 50 random actions at the beginning. If the task has no success, mean
     returns decide instead. Training that was stopped goes on with the seeds that are missing.
 
+    A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
+    observations, give the statistics too: its own file does not hold them. Such files can hold
+    code that runs when they are read: open none from strangers.
+
     Example: qbumpers expert lunar-lander --out expert.npz
     """
     from qbumpers.experts.selecting import make_recipe
     from qbumpers.tasks import make_task
 
-    made: Any = make_task(task, discount=discount)
+    made = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
+    _check_conversion(made, check, convert, statistics)
     path = out or Path(f"{task.replace('/', '-')}.npz")
     with stoppable():
         if made.states:
@@ -93,6 +118,8 @@ def expert(
             return
         if check is not None:
             _check(made, check, figures)
+        elif convert is not None:
+            _convert(made, convert, statistics, path)
         else:
             recipe = make_recipe(
                 made,
@@ -107,6 +134,37 @@ def expert(
             _correct(made, check or path, corrected)
 
 
+def _check_conversion(
+    task: Any, check: Path | None, convert: Path | None, statistics: Path | None
+) -> None:
+    if convert is None and statistics is not None:
+        raise RequestError(
+            f"--statistics {statistics}: they are of a model; give --convert FILE too"
+        )
+    if convert is not None and check is not None:
+        raise RequestError(
+            f"--convert {convert}: --check only looks at values; give one of the two"
+        )
+    if convert is not None and task.states:
+        raise RequestError(
+            f"--convert {convert}: task {task.name} has a table, it is solved exactly"
+        )
+
+
+def _convert(task: "Task", model: Path, statistics: Path | None, path: Path) -> None:
+    from qbumpers.experts import check_expert, from_stable_baselines
+
+    with expert_warnings_printed():
+        values = from_stable_baselines(model, task, statistics)
+        values.save(path)
+        found = check_expert(task, values)
+    OUTPUT.print(
+        f"{escape(values.method)}: mean return {found.expert.mean:.1f}, of random actions "
+        f"{found.random.mean:.1f}\nValues: [bold]{escape(str(path))}[/bold]",
+        soft_wrap=True,
+    )
+
+
 def _hidden(text: str) -> list[int]:
     try:
         return [int(size) for size in text.split(",") if size]
@@ -116,7 +174,7 @@ def _hidden(text: str) -> list[int]:
         ) from error
 
 
-def _train(task: "VectorTask", recipe: "Recipe", seeds: list[int], path: Path) -> None:
+def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.selecting import train_best
 
@@ -148,15 +206,13 @@ def _steps_bar() -> rich.progress.Progress:
     return rich.progress.Progress(*columns, console=OUTPUT)
 
 
-def _judgements(
-    task: "VectorTask", names: Sequence[Any], judgements: "Sequence[Judgement]"
-) -> Table:
-    kind = "success" if task.has_success else "return"
+def _judgements(task: "Task", names: Sequence[Any], judgements: "Sequence[Judgement]") -> Table:
+    kind = "success" if "success" in task.events else "return"
     listing = table(
         "seed", f"{kind}, 2% random", "10% random", "after 50 random", "greedy return",
         "V of start", "achieved", "Q at crashes",
     )  # fmt: skip
-    digits = 2 if task.has_success else 1
+    digits = 2 if "success" in task.events else 1
     for name, found in zip(names, judgements, strict=True):
         merits = (_number(merit, digits) for merit in found.merits)
         crash = "-" if found.crash_value is None else _number(found.crash_value, 1)
@@ -173,7 +229,7 @@ def _number(found: "MeanWithError", digits: int) -> str:
     return f"{found.mean:.{digits}f}"
 
 
-def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
+def _check(task: "Task", path: Path, figures: Path | None) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.choosing import judge
     from qbumpers.experts.loading import load_network
@@ -205,7 +261,7 @@ def _check(task: "VectorTask", path: Path, figures: Path | None) -> None:
         _draw(checks, path, figures)
 
 
-def _correct(task: "VectorTask", path: Path, out: Path) -> None:
+def _correct(task: "Task", path: Path, out: Path) -> None:
     from qbumpers.experts import correcting
     from qbumpers.experts.loading import load_network
 
@@ -243,9 +299,7 @@ def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
     OUTPUT.print(f"Figure: [bold]{escape(str(drawn))}[/bold]", soft_wrap=True)
 
 
-def _solve_or_check(
-    task: "TabularTask", check: Path | None, figures: Path | None, path: Path
-) -> None:
+def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path: Path) -> None:
     from qbumpers.experts.loading import load_table
     from qbumpers.experts.tables import check_exactness
     from qbumpers.values import solve

@@ -1,6 +1,6 @@
 """`qbumpers list`."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 from rich.table import Table
@@ -33,8 +33,9 @@ def _list_assistants() -> Table:
 
     listing = table("assistant", "options (with defaults)", "what it does")
     for name, rule in assistants().items():
-        defaults: dict[str, Any] = rule.options_type._field_defaults  # type: ignore[attr-defined]
-        fields: tuple[str, ...] = rule.options_type._fields  # type: ignore[attr-defined]
+        kind: Any = rule.options_type
+        defaults: dict[str, Any] = kind._field_defaults
+        fields: tuple[str, ...] = kind._fields
         options = [f"{f} = {str(defaults[f]).lower()}" if f in defaults else f for f in fields]
         listing.add_row(name, ", ".join(options), _first_line(rule.decide))
     return listing
@@ -58,7 +59,8 @@ def _list_learners() -> Table:
 
     listing = table("learner", "settings (with defaults)", "learns from", "what it does")
     for name, learner in learners().items():
-        defaults: dict[str, Any] = learner.settings_type._field_defaults  # type: ignore[attr-defined]
+        kind: Any = learner.settings_type
+        defaults: dict[str, Any] = kind._field_defaults
         settings = [f"{field} = {_short(value)}" for field, value in defaults.items()]
         observed = "numbered states" if learner.observes == "states" else "vectors"
         listing.add_row(name, ", ".join(settings), observed, _first_line(learner.settings_type))
@@ -82,7 +84,7 @@ def _list_perceptions() -> Table:
 
 def _short(value: Any) -> str:
     if isinstance(value, tuple):
-        return "(" + ", ".join(map(_short, value)) + ")"
+        return "(" + ", ".join(map(_short, cast("tuple[Any, ...]", value))) + ")"
     return str(value).lower()
 
 

@@ -80,8 +80,8 @@ class Before(NamedTuple):
     """What was known before a run.
 
     Attributes:
-        trials: that were there already.
-        expected: seconds that the others were to take; None if nobody can tell.
+        trials: how many trials were there already.
+        expected: seconds that the others were to take; None if it is unknown.
     """
 
     trials: int

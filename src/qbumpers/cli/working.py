@@ -1,7 +1,7 @@
 """Options that long work has in common: where it is done, and where its results go."""
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -34,7 +34,7 @@ Out = Annotated[
 
 
 @contextlib.contextmanager
-def backend_for(workers: int | None, on: str | None) -> Iterator["Backend"]:
+def backend_for(workers: int | None, on: str | None) -> Generator["Backend", None, None]:
     """Where cells are worked on: cores of this machine, or a Ray cluster."""
     from qbumpers.experiments.local import ThisMachine
 

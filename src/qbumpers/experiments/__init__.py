@@ -1,1 +1,1 @@
-"""Experiments as data: their design, running them, and keeping what they find."""
+"""Experiments as data: their design, running them, and storing what they find."""

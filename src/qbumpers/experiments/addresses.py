@@ -28,7 +28,7 @@ def host_and_port(address: str) -> tuple[str, int]:
         Host and port.
 
     Raises:
-        ValueError: where it is something else.
+        ValueError: if it is something else.
     """
     parts = urlsplit(f"//{address}")
     if not parts.hostname or not parts.port or parts.netloc != address or "@" in address:
@@ -52,7 +52,7 @@ def check_address(address: str) -> None:
         address: HOST:PORT.
 
     Raises:
-        RequestError: where that is not so.
+        RequestError: if that is not so.
     """
     if address.startswith("ray://"):
         raise RequestError(
@@ -79,7 +79,7 @@ def check_connecting(address: str) -> None:
         address: HOST:PORT.
 
     Raises:
-        RequestError: where it cannot in time.
+        RequestError: if it cannot in time.
     """
     command = [sys.executable, "-c", _CONNECT, address]
     try:
@@ -92,7 +92,7 @@ def check_connecting(address: str) -> None:
 
 
 def unusable(address: str, reason: str) -> RequestError:
-    """An error for an address where Ray cannot be used.
+    """An error for an address at which Ray cannot be used.
 
     Args:
         address: as the user gave it.

@@ -15,7 +15,7 @@ class Cell(NamedTuple):
 
     Attributes:
         content: digest of everything that decides its numbers, in hexadecimal.
-        first: the first trial.
+        first: number of its first trial.
         trials: how many.
     """
 
@@ -35,10 +35,10 @@ def trials_a_cell(episodes: int) -> int:
 
 
 def tiles(content: str, trials: int, size: int, finished: Iterable[Cell] = ()) -> list[Cell]:
-    """Cells that together hold the trials of a condition, finished ones where there are any.
+    """Cells that together hold the trials of a condition, finished ones if there are any.
 
     Args:
-        content: of the condition.
+        content: digest of the condition, see `Cell`.
         trials: how many trials are wanted.
         size: trials of a new cell; new cells end at multiples of it.
         finished: cells of this content that are there already; they may overlap, as those of a run

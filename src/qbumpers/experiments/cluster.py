@@ -26,6 +26,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.simulation import Condition
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.packing import packed
 
 BATCH_SECONDS = 2.0
@@ -53,7 +54,7 @@ class RayCluster:
         cores: how many cells are worked on at once; known from the beginning of the context.
 
     Raises:
-        RequestError: at the beginning of the context, where Ray is not installed, nothing answers
+        RequestError: at the beginning of the context, if Ray is not installed, nothing answers
             at the address, or a node has other versions than this machine.
     """
 
@@ -82,7 +83,9 @@ class RayCluster:
         return self
 
     def _connect(self) -> None:
-        settings = {**_QUIET, "include_dashboard": False} if self.address == LOCAL else _QUIET
+        settings: dict[str, Any] = dict(_QUIET)
+        if self.address == LOCAL:
+            settings |= {"include_dashboard": False, "num_cpus": usable_cores()}
         try:
             self._ray.init(self.address, **settings)
         except Exception as error:
@@ -99,14 +102,14 @@ class RayCluster:
         """Do the work of cells and yield each as it comes back, in any order.
 
         Args:
-            plan: the experiment.
-            seconds: the cells, with how long each will take.
+            plan: the experiment whose conditions the cells belong to.
+            seconds: the cells to be done, with the seconds that each is expected to take.
 
         Yields:
             Finished cells; a closed generator leaves what has begun unfinished.
 
         Raises:
-            ConnectionError: where the cluster is gone, or lost a batch of cells too often.
+            ConnectionError: if the cluster is gone, or lost a batch of cells too often.
         """
         ray = self._ray
         submit = ray.remote(num_cpus=1, max_retries=_RETRIES)(_finish_batch).remote
@@ -134,7 +137,7 @@ def batches(seconds: dict[Cell, float], cores: int) -> Iterator[list[Cell]]:
     """Cells in batches that are worth handing over: large at first, small towards the end.
 
     Args:
-        seconds: the cells, with how long each will take.
+        seconds: the cells to be done, with the seconds that each is expected to take.
         cores: how many batches are worked on at once.
 
     Yields:
@@ -198,7 +201,7 @@ def _received(ray: Any, reference: Any) -> Any:
 
 
 def _check_alive(ray: Any, address: str) -> None:
-    """Raise where Ray would wait for ever."""
+    """Raise if Ray would wait for ever."""
     if not listens(*host_and_port(ray.get_runtime_context().gcs_address)):
         raise ConnectionError(f"the Ray cluster at {address} does not answer any more")
     if ray.cluster_resources().get("CPU", 0) < 1:
@@ -216,7 +219,7 @@ def _imported(settings: dict[str, str]) -> Any:
 
 
 def _check_versions(ray: Any, address: str) -> None:
-    """Raise where a node would compute other numbers, or other bytes of them."""
+    """Raise if a node would compute other numbers, or other bytes of them."""
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
     submit = ray.remote(num_cpus=0, max_retries=0)(_asked_for_versions())
@@ -232,9 +235,9 @@ def _check_versions(ray: Any, address: str) -> None:
     for reference in answered:
         found = _differences(_received(ray, reference), versions())
         problems.setdefault(found, []).append(asked[reference])
-    told = [f"{', '.join(who)}: {what}" for what, who in problems.items() if what and who]
-    if told:
-        raise RequestError(f"on = {address!r}: of its nodes, {'; '.join(told)}")
+    found_wrong = [f"{', '.join(who)}: {what}" for what, who in problems.items() if what and who]
+    if found_wrong:
+        raise RequestError(f"on = {address!r}: of its nodes, {'; '.join(found_wrong)}")
 
 
 def _asked_for_versions() -> Callable[[], dict[str, str]]:
@@ -249,7 +252,7 @@ def _asked_for_versions() -> Callable[[], dict[str, str]]:
 
 
 def _differences(found: dict[str, str], expected: dict[str, str]) -> str:
-    """In what a node differs; empty where in nothing."""
+    """In what a node differs; empty if in nothing."""
     different = [
         f"{name} {found[name]}, not {expected[name]}"
         for name in expected

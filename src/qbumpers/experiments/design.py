@@ -38,8 +38,8 @@ class TaskDesign(Model):
 
     Attributes:
         name: for instance "cliff-walking" or "FrozenLake-v1".
-        discount: of a Gymnasium environment, in (0, 1].
-        episode_limit: of a Gymnasium environment, in steps; its own where left out.
+        discount: gamma, in (0, 1], for a Gymnasium environment, which states none.
+        episode_limit: of a Gymnasium environment, in steps; its own if left out.
         arguments: of the task, for instance `{ seed = 0 }` of "lunar-lander", or of a Gymnasium
             environment, for instance `{ is_slippery = true }`.
     """
@@ -50,7 +50,7 @@ class TaskDesign(Model):
     arguments: dict[str, Any] = Field(default_factory=dict)
 
     def task(self) -> Task:
-        """The task of this design; RequestError where there is none."""
+        """The task of this design; RequestError if there is none."""
         return make_task(
             self.name,
             discount=self.discount,
@@ -82,9 +82,9 @@ class NamedCondition(NamedTuple):
 
     Attributes:
         condition: its readable id, for instance "stochastic-q-bumpers/alpha=0.7"; with
-            "@perception=observant" at its end where the experiment has several learners.
-        assistant: the assistant.
-        learner: the simulated learner.
+            "@perception=observant" at its end if the experiment has several learners.
+        assistant: rule and options.
+        learner: who meets the assistant.
         learner_id: the learner's readable id, for instance "q-learning".
     """
 
@@ -102,18 +102,18 @@ class Experiment(Model):
         reproduces: the published experiment to be compared with, for instance "cliff-walking".
         task: which task, as a table or just its name.
         values: Q* of the assistants: "exact" or "q-learning" for a task with a table, "expert" for
-            the expert that ships for a task, or the path of a values file. Where left out, exact
+            the expert that ships for a task, or the path of a values file. If left out, exact
             for a task with a table, else the expert's.
         learners: the simulated learners; every assistant meets each of them. If left out, the
             paper's, of the kind that suits the task.
         assistants: what to compare; one for each combination of listed options.
-        trials: people a condition.
-        episodes: assisted episodes a trial, each followed by a greedy one without help.
-        retention: further episodes in which people go on without the assistant.
-        criterion: return without help that counts as having learned, in reward units.
+        trials: simulated learners per condition.
+        episodes: assisted episodes per trial, each followed by a greedy unassisted one.
+        retention: further episodes in which learners go on without the assistant.
+        criterion: unassisted return that counts as having learned, in reward units.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition,
             so that conditions can be compared trial by trial.
-        seed: of all random streams.
+        seed: from which, with the content of each condition, all random streams come.
     """
 
     name: Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
@@ -178,7 +178,7 @@ class Experiment(Model):
         """The conditions, learner by learner, in the order of the file.
 
         Raises:
-            RequestError: where an assistant or option is wrong, or a condition occurs twice.
+            RequestError: if an assistant or option is wrong, or a condition occurs twice.
         """
         made = [a for design in self.assistants for a in design.assistants()]
         names = [condition_id(assistant, made) for assistant in made]
@@ -220,19 +220,19 @@ def learner_observes(name: Any) -> str:
 
 
 def _learner_name(task: Any) -> str:
-    """Name of the way in which people can learn a task, given as plain data."""
+    """Name of the learner that suits a task, given as plain data."""
     try:
         return TaskDesign.model_validate(task).task().learners[0]
     except (ValidationError, RequestError):
-        return "q-learning"  # what is wrong with the task is told where the task is needed
+        return "q-learning"  # the error comes where the task is needed
 
 
 def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
     """A readable id: the name, with options that have no default or vary among its kind.
 
     Args:
-        assistant: of the condition.
-        among: the assistants of all conditions.
+        assistant: whose id is wanted.
+        among: the assistants of all conditions, to see which options vary.
 
     Returns:
         For instance "local-q-thresholding/alpha=0.0195".

@@ -65,16 +65,17 @@ class LearnerDesign(Model):
     def setup(self, task_discount: float) -> dict[str, Any]:
         """What `make_condition` needs to know of the learner, at a task of that discount."""
         motor = self.motor.model_dump() if self.motor else {}
-        perception = self.perception
-        if not isinstance(perception, str):
-            perception = Perception(**perception.model_dump())
         return {
             "learner": self.learner(task_discount),
-            "perception": perception,
+            "perception": self._perceived(),
             "penalty": self.penalty,
             "motor": Motor(**motor),
             "forgetting": self.forgetting,
         }
+
+    def _perceived(self) -> str | Perception:
+        given = self.perception
+        return given if isinstance(given, str) else Perception(**given.model_dump())
 
     def learner(self, task_discount: float) -> Any:
         """The settings of its kind, at a task of that discount."""
@@ -85,8 +86,8 @@ class LearnerDesign(Model):
         return settings_of(kind, fields)
 
     def described(self) -> dict[str, Any]:
-        """Every field in the order in which ids tell them."""
-        fields = self.model_dump()
+        """Every field in the order in which ids show them."""
+        fields = {**self.model_dump(), "perception": self._perceived()}
         fields["motor"] = fields["motor"] or Motor()._asdict()
         last = {name: fields.pop(name) for name in ("penalty", "motor", "forgetting")}
         return {**fields, **last}
@@ -157,8 +158,8 @@ def apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> 
 
     Args:
         learner: one of them.
-        among: the learners of an experiment.
-        mark: put before what is told.
+        among: all learners of the experiment, itself included.
+        mark: what is put before it.
 
     Returns:
         For instance "@perception=observant".
@@ -179,6 +180,8 @@ def written(value: Any) -> str:
     """A value as ids have it: short and exact."""
     if isinstance(value, Assistant):
         return _inline_table(value)
+    if isinstance(value, Perception):
+        return _table_of_perception(value)
     if isinstance(value, dict):  # settings within settings
         return "..".join(written(part) for part in value.values())
     if isinstance(value, list | tuple):
@@ -194,3 +197,14 @@ def _inline_table(assistant: Assistant) -> str:
     shown = {f: v for f, v in assistant.options._asdict().items() if defaults.get(f) != v}
     parts = [f'"{assistant.name}"', *(f"{f}={written(v)}" for f, v in shown.items())]
     return "{name=" + ",".join(parts) + "}"
+
+
+def _table_of_perception(perception: Perception) -> str:
+    """A perception as a file has it: `notices`, and what is not the default."""
+    defaults = Perception._field_defaults
+    shown = [
+        f"{field}={written(value)}"
+        for field, value in perception._asdict().items()
+        if field == "notices" or value != defaults[field]
+    ]
+    return "{" + ",".join(shown) + "}"

@@ -1,7 +1,6 @@
-"""Cells on this machine: threads where compiled loops let each other run, else processes."""
+"""Cells on this machine: threads if compiled loops let each other run, else processes."""
 
 import itertools
-import os
 from collections.abc import Generator, Iterable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -10,36 +9,37 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
+from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.workers import make_pool, some_finished, submit
 
 
 class ThisMachine:
-    """Cores of this machine: threads of this process, or processes where a task needs them.
+    """Cores of this machine: threads of this process, or processes if a task needs them.
 
     Args:
-        workers: how many; all cores where None.
+        workers: how many; all usable cores if None.
 
     Raises:
-        RequestError: where `workers` is below 1.
+        RequestError: if `workers` is below 1.
     """
 
     def __init__(self, workers: int | None = None) -> None:
         if workers is not None and workers < 1:
             raise RequestError(f"workers = {workers!r}; at least 1 is needed")
-        self.cores = workers or os.cpu_count() or 1
+        self.cores = workers or usable_cores()
 
     def __call__(self, plan: Plan, seconds: dict[Cell, float]) -> Generator[Finished]:
         """Do the work of cells and yield each as it is finished, in any order.
 
         Args:
-            plan: the experiment.
-            seconds: the cells, with how long each will take.
+            plan: the experiment whose conditions the cells belong to.
+            seconds: the cells to be done, with the seconds that each is expected to take.
 
         Yields:
             Finished cells; a closed generator leaves what has begun unfinished.
 
         Raises:
-            ChildProcessError: where a process was lost, for instance for want of memory.
+            ChildProcessError: if a process was lost, for instance for want of memory.
         """
         remaining: Iterable[Cell] = iter(seconds)
         waiting: set[Future[Finished]] = set()

@@ -72,7 +72,7 @@ def settings_of(kind: type, fields: dict[str, Any]) -> Any:
     """The NamedTuple of a model's fields.
 
     Args:
-        kind: its class.
+        kind: the NamedTuple class to be made.
         fields: plain data, as `model_dump` gives them.
     """
     hints = get_type_hints(kind)

@@ -3,7 +3,7 @@
 import dataclasses
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
 from qbumpers.simulation import Condition, engine_of, make_condition
 from qbumpers.simulation import run as run_condition
-from qbumpers.tasks import Task, VectorTask
+from qbumpers.tasks import Task
 from qbumpers.values import (
     NetworkValues,
     TabularValues,
@@ -31,7 +31,7 @@ _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
-_SOURCES: dict[str, Callable[[Any], TabularValues | NetworkValues]] = {
+_SOURCES: dict[str, Callable[[Task], TabularValues | NetworkValues]] = {
     "exact": solve,
     "q-learning": learn_values,
     "expert": lambda task: shipped_expert(task.name),
@@ -44,8 +44,8 @@ class Plan(NamedTuple):
     """An experiment made ready.
 
     Attributes:
-        experiment: the design.
-        task: its task.
+        experiment: what it was made from.
+        task: what its learners learn.
         values: Q* of its assistants.
         named: the conditions as the experiment names them, each with the digest of its content.
         conditions: what the trials of each content need.
@@ -67,14 +67,14 @@ def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | No
     """Check a whole experiment.
 
     Args:
-        experiment: the design.
+        experiment: what it was made from.
         values: Q* in place of what the experiment names: what an output folder keeps of its run.
 
     Returns:
         The plan.
 
     Raises:
-        RequestError: where the task, values, a learner or an assistant is wrong.
+        RequestError: if the task, values, a learner or an assistant is wrong.
 
     Warns:
         ExpertWarning: if the values of a network are no better than random play.
@@ -107,7 +107,7 @@ def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | No
         named.append((each, content))
         conditions[content] = condition
     if not task.states:
-        check_expert(cast(VectorTask, task), values)
+        check_expert(task, values)
     files: dict[str, np.ndarray] = {}
     noted = _noted(task, named, conditions, files)
     record = noted._replace(task=task.digest(), values=values.digest())
@@ -162,10 +162,10 @@ def _values(source: str, task: Task) -> TabularValues | NetworkValues:
 def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
     """How long cells will take on one core, from a short calibration.
 
-    Compiles loops where they are not compiled yet.
+    Compiles loops if they are not compiled yet.
 
     Args:
-        plan: the experiment.
+        plan: the experiment that the cells belong to.
         cells: what is to be done.
 
     Returns:

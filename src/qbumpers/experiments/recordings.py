@@ -42,7 +42,7 @@ def export_recording(
     compared with the run.
 
     Args:
-        folder: of the run.
+        folder: output folder of the run.
         condition: a readable id in its `episodes.parquet`.
         dataset: name of the dataset to be made where Minari keeps its own, for instance
             "cliff/bumpers-v0".
@@ -52,7 +52,7 @@ def export_recording(
         How many episodes were written.
 
     Raises:
-        RequestError: where the folder is not one of a finished run, the condition or a trial is not
+        RequestError: if the folder is not one of a finished run, the condition or a trial is not
             in it, what is played is not what was run, the dataset is there already or badly named,
             or Minari is not installed.
     """

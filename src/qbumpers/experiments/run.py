@@ -32,7 +32,7 @@ class RunProgress(NamedTuple):
     Attributes:
         trials: finished, those of an earlier run included.
         of: trials of the whole experiment.
-        steps: that learners took in this run.
+        steps: how many steps learners took in this run.
         expected: seconds that this run will take, by calibration, from its start.
         damaged: files of an earlier run that were damaged; their trials are run again.
         changed: why finished trials of an earlier run are simulated again, a sentence each.
@@ -62,8 +62,8 @@ def run_experiment(
         report: called with the progress at first and after each cell, from the calling thread.
 
     Raises:
-        RequestError: where the folder holds another experiment, or another run is writing to it.
-        StoreError: where results cannot be written; finished cells stay.
+        RequestError: if the folder holds another experiment, or another run is writing to it.
+        StoreError: if results cannot be written; finished cells stay.
     """
     backend = backend or ThisMachine()
     design = plan.experiment

@@ -1,5 +1,6 @@
 """Experiments from TOML files and from plain data."""
 
+import codecs
 import math
 import tomllib
 from pathlib import Path
@@ -73,7 +74,7 @@ def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
     """An experiment from a TOML file.
 
     Args:
-        path: of the file.
+        path: where the file is.
         large: whether more than `MANY_CELLS` cells of work are meant.
 
     Returns:
@@ -95,7 +96,7 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
     """What a TOML file says.
 
     Args:
-        content: of the file.
+        content: the bytes of the file.
         where: for the message, for example the path of the file.
 
     Returns:
@@ -105,6 +106,10 @@ def parsed(content: bytes, where: str) -> dict[str, Any]:
         RequestError: if it is no TOML.
     """
     try:
-        return tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        return tomllib.loads(content.decode("utf-8-sig"))  # some editors begin with a mark
+    except UnicodeDecodeError as error:
+        wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        found = "it is UTF-16" if wide else f"byte {error.start + 1} is not UTF-8"
+        raise RequestError(f"{where}: not valid TOML: {found}; save it as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
         raise RequestError(f"{where}: not valid TOML: {error}") from error

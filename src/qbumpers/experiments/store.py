@@ -47,7 +47,7 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
     "states.parquet",
     "values.npz",
 )
-"""Files of an output folder; design and platform, a row an episode, a row a state, Q*."""
+"""Files of an output folder; design and platform, a row per episode, a row per state, Q*."""
 
 NEEDED = (EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES)
 """What the analysis reads."""
@@ -70,8 +70,8 @@ class Results(NamedTuple):
 
     Attributes:
         experiment: as run.
-        episodes: a row an episode.
-        states: a row a condition and state; None where observations are vectors.
+        episodes: a row per episode.
+        states: a row per condition and state; None if observations are vectors.
         values: Q* of the assistants.
         conditions: what is noted of each.
     """
@@ -115,7 +115,7 @@ class Store:
     digest of its bytes, so that damage shows wherever it is.
 
     Args:
-        folder: of the results, locked.
+        folder: where the results are, locked against other writers.
         tables: what a finished cell holds, see `tables_of`.
         record: of the conditions that are run.
         before: what the folder noted until now; None if that is nothing.
@@ -183,7 +183,7 @@ class Store:
             cells: of each content, in the order of their trials.
 
         Raises:
-            StoreError: where a cell cannot be read, or a table cannot be written.
+            StoreError: if a cell cannot be read, or a table cannot be written.
         """
         for kind in self._tables:
             table = assembled(
@@ -194,7 +194,7 @@ class Store:
             self._folder.write(kind, encoded(table))
 
     def read(self, cell: Cell, kind: str) -> pl.DataFrame:
-        """A table of a cell that was written or surveyed; StoreError where it is damaged."""
+        """A table of a cell that was written or surveyed; StoreError if it is damaged."""
         name = self._files[cell, kind]
         content = self._folder.read(name) or b""
         if f"-{_digest(content)}." not in name:
@@ -271,7 +271,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
     """Open an output folder for one run, which alone writes to it.
 
     Args:
-        folder: of the results, a path or a URL; made where it is missing.
+        folder: where the results go, a path or a URL; made if it is missing.
         experiment: to be run, or continued.
         record: of its conditions.
 
@@ -279,9 +279,9 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
         The store, with what a killed run left half-written cleared away.
 
     Raises:
-        RequestError: where the folder is a file, holds another experiment, or another run is
+        RequestError: if the folder is a file, holds another experiment, or another run is
             writing to it.
-        StoreError: where it cannot be written.
+        StoreError: if it cannot be written.
     """
     place = open_folder(folder)
     with place.locked():
@@ -304,7 +304,7 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
     """What an output folder holds, as Polars frames.
 
     Args:
-        folder: of a run, a path or a URL.
+        folder: output folder of a run, a path or a URL.
         unfinished: whether to load what there is of a run that is not finished; `Results.missing`
             then says what is not there.
 
@@ -312,8 +312,8 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
         The experiment and its tables.
 
     Raises:
-        RequestError: where the folder is not one of a run, or damaged; where the run is not
-            finished, unless that is allowed and some trials are.
+        RequestError: if the folder is not one of a run, or damaged; if the run is not finished,
+            unless that is allowed and some trials are.
     """
     place = open_folder(folder)
     experiment = load_design(folder)
@@ -437,7 +437,7 @@ def load_design(folder: str | Path) -> Experiment:
 
 
 def _read_design(folder: Folder) -> Experiment | None:
-    """The experiment of an output folder; None where there is none."""
+    """The experiment of an output folder; None if there is none."""
     content = folder.read(EXPERIMENT)
     if content is None:
         return None

@@ -19,7 +19,7 @@ class Finished(NamedTuple):
     Attributes:
         cell: which one.
         files: what is to be kept, by kind of table.
-        steps: that its learners took.
+        steps: how many steps its learners took.
     """
 
     cell: Cell
@@ -31,9 +31,9 @@ def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
     """Do the work of a cell; equal arguments give equal bytes, wherever it is done.
 
     Args:
-        condition: of the cell.
+        condition: what the cell's content digest stands for.
         cell: which trials.
-        seed: of the experiment.
+        seed: the experiment's, for the random streams.
 
     Returns:
         The cell with its tables, encoded.
@@ -46,15 +46,15 @@ def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
 
 
 def episode_table(condition: Condition, cell: Cell, simulation: Simulation) -> pl.DataFrame:
-    """A row an episode of one cell.
+    """A row per episode of one cell.
 
     Args:
-        condition: of the cell.
+        condition: what the cell's content digest stands for.
         cell: whose trials these are.
         simulation: what happened.
 
     Returns:
-        Columns as in `episodes.parquet` from `trial` on; success and crash are null where the task
+        Columns as in `episodes.parquet` from `trial` on; success and crash are null if the task
         knows none.
     """
     outcomes = simulation.outcomes
@@ -90,7 +90,7 @@ def known_events(task: Task) -> dict[str, tuple[bool, int]]:
 
 
 def state_table(task: Task, counts: StateCounts) -> pl.DataFrame:
-    """A row a state of one cell: how often it was acted in.
+    """A row per state of one cell: how often it was acted in.
 
     Args:
         task: a task with a table.

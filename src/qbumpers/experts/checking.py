@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.experts.episodes import play_several
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import QValues
 
 
 class ExpertWarning(UserWarning):
-    """The assistant's action values are no better than no values."""
+    """The assistant's action values are no better than none, or may not be the model's."""
 
 
 class MeanWithError(NamedTuple):
@@ -27,7 +27,7 @@ class ExpertCheck(NamedTuple):
 
     Attributes:
         expert: mean undiscounted return of the expert.
-        random: of uniformly random actions.
+        random: mean undiscounted return of uniformly random actions.
     """
 
     expert: MeanWithError
@@ -47,16 +47,16 @@ def mean_with_error(numbers: np.ndarray) -> MeanWithError:
 
 
 def check_expert(
-    task: VectorTask, values: QValues, *, episodes: int = 20, epsilon: float = 0.02, seed: int = 0
+    task: Task, values: QValues, *, episodes: int = 20, epsilon: float = 0.02, seed: int = 0
 ) -> ExpertCheck:
     """Compare greedy play by action values with random play; warn if it is no better.
 
     Args:
         task: what is played.
-        values: of the expert.
-        episodes: of each.
+        values: Q* of the expert, any callable from an observation to a value per action.
+        episodes: how many each of the two plays, at least 1.
         epsilon: probability of a random action in the expert's episodes.
-        seed: of the random numbers, not negative.
+        seed: decides chance of the environment and random actions; not negative.
 
     Returns:
         Both returns.

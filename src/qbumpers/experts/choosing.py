@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, discounted_return, play_several
 from qbumpers.experts.training import Recipe, train_expert
 from qbumpers.random_streams import content_digest
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import load_values
 
@@ -43,13 +44,13 @@ class Judgement(NamedTuple):
     crash_value: MeanWithError | None
 
 
-def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
+def judge(task: Task, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:
     """Judge an expert.
 
     Args:
         task: what it is to be good at.
-        values: of the expert.
-        episodes: of each setting, at least 1.
+        values: Q* of the expert.
+        episodes: how many are played in each of `SETTINGS`, at least 1.
 
     Returns:
         The judgement; equal values are judged alike.
@@ -70,8 +71,8 @@ def judge(task: VectorTask, values: NetworkValues, *, episodes: int = EPISODES) 
     )
 
 
-def _merit(task: VectorTask, episodes: Iterable[Episode]) -> MeanWithError:
-    if task.has_success:
+def _merit(task: Task, episodes: Iterable[Episode]) -> MeanWithError:
+    if "success" in task.events:
         return mean_with_error(np.array([float(episode.success) for episode in episodes]))
     return mean_with_error(np.array([episode.rewards.sum() for episode in episodes]))
 
@@ -88,7 +89,7 @@ def best(judgements: Sequence[Judgement]) -> int:
 
 
 def train_several(
-    task: VectorTask,
+    task: Task,
     recipe: Recipe,
     seeds: Iterable[int],
     folder: Path,
@@ -98,8 +99,8 @@ def train_several(
 
     Args:
         task: what they are to be good at.
-        recipe: of all of them.
-        seeds: of the random numbers, not negative.
+        recipe: how each of them is trained.
+        seeds: one per expert; each decides all chance of its training; not negative.
         folder: where each is kept.
         report: called with a seed and its steps done.
 
@@ -109,16 +110,12 @@ def train_several(
     Raises:
         RequestError: as `train_expert`, and if a kept file is damaged.
     """
-    experts = []
+    experts: list[NetworkValues] = []
     for seed in seeds:
         content = content_digest([task.digest(), recipe.words(seed)]).hex()
         path = folder / f"seed-{seed}-{content[:12]}.npz"
         if not path.exists():
-
-            def report_steps(steps: int, seed: int = seed) -> None:
-                report(seed, steps)
-
-            train_expert(task, recipe, seed=seed, report=report_steps).save(path)
+            train_expert(task, recipe, seed=seed, report=partial(report, seed)).save(path)
         values = load_values(path)
         if not isinstance(values, NetworkValues):
             raise RequestError(f"{path}: a table of values; delete it, it is not of this training")
@@ -128,10 +125,10 @@ def train_several(
 
 
 def with_provenance(
-    task: VectorTask, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
+    task: Task, values: NetworkValues, judgement: Judgement, seeds: Sequence[int]
 ) -> NetworkValues:
     """The same values, with how they were chosen and what they reach in their provenance."""
-    kind = "success" if task.has_success else "return"
+    kind = "success" if "success" in task.events else "return"
     reached = ", ".join(
         f"{merit.mean:.2f} at epsilon {epsilon:g}"
         + (f" after {start} random actions" if start else "")

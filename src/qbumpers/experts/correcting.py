@@ -24,7 +24,7 @@ from qbumpers.learners.interface import Transition
 from qbumpers.networks.network import Layout, named_parameters
 from qbumpers.random_streams import LEARNER, trial_streams
 from qbumpers.registration import as_numbers
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 BRANCHES = 6_000
@@ -72,8 +72,8 @@ class Correction(NamedTuple):
 
     Attributes:
         values: corrected.
-        before: the given values in states held out.
-        after: the corrected ones there.
+        before: how the given values fit in states held out.
+        after: how the corrected values fit there.
     """
 
     values: NetworkValues
@@ -82,7 +82,7 @@ class Correction(NamedTuple):
 
 
 def correct_values(
-    task: VectorTask,
+    task: Task,
     values: NetworkValues,
     *,
     branches: int = BRANCHES,
@@ -93,11 +93,11 @@ def correct_values(
     """Correct action values by what their own greedy policy achieves where learners go.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: to be corrected.
         branches: states in which an action is tried, at least 10.
         learners: that are simulated unassisted to visit states, at least 1.
-        seed: of the random numbers, not negative.
+        seed: decides learners, tried actions and the fit; not negative.
         report: called with the branches done.
 
     Returns:
@@ -128,7 +128,7 @@ def _chosen(samples: Samples, which: np.ndarray) -> Samples:
 
 
 def sample_returns(
-    task: VectorTask,
+    task: Task,
     values: NetworkValues,
     visited: list[Episode],
     branches: int,
@@ -138,11 +138,11 @@ def sample_returns(
     """Try actions in visited states; half of them the action chosen there, half a random one.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: whose greedy policy plays on.
         visited: episodes.
         branches: how many.
-        seed: of the random numbers.
+        seed: decides which states and actions are tried.
         report: called with the branches done.
 
     Returns:
@@ -177,7 +177,7 @@ def fit_correction(values: NetworkValues, samples: Samples, seed: int) -> Networ
     Args:
         values: to be corrected.
         samples: what they are fitted to.
-        seed: of the fit.
+        seed: decides first weights and batches of the fit.
 
     Returns:
         The corrected values: one network that holds the given one and the correction side by side,

@@ -9,7 +9,8 @@ from qbumpers.choice import best_value, pick
 from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import QValues, check_width
 
 Policy = Callable[[np.ndarray, int], int]
@@ -51,12 +52,12 @@ class Episode(NamedTuple):
         return bool(self.events & CRASH)
 
 
-def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> Episode:
+def play(task: Task, stepper: Stepper, policy: Policy, chance: float) -> Episode:
     """Play an episode.
 
     Args:
         task: what is played.
-        stepper: its environment.
+        stepper: the environment of the task, reset by this call.
         policy: chooses the actions.
         chance: in [0, 1), for the environment; equal chance and actions give equal episodes.
 
@@ -66,8 +67,10 @@ def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> E
     Raises:
         RequestError: if an observation or a reward is not finite.
     """
-    observation = stepper.reset(chance)
-    observations, actions, rewards, events = [observation], [], [], 0
+    actions: list[int] = []
+    rewards: list[float] = []
+    observation, events = stepper.reset(chance), 0
+    observations = [observation]
     while len(actions) < task.episode_limit:
         action = policy(observation, len(actions))
         observation, reward, event = stepper.step(action)
@@ -84,7 +87,7 @@ def play(task: VectorTask, stepper: Stepper, policy: Policy, chance: float) -> E
     return episode
 
 
-def _check_finite(task: VectorTask, episode: Episode) -> None:
+def _check_finite(task: Task, episode: Episode) -> None:
     rewards = np.concatenate([[0.0], episode.rewards])
     broken = np.flatnonzero(~np.isfinite(episode.observations.sum(axis=1) + rewards))
     if len(broken):
@@ -108,6 +111,7 @@ def greedy(values: QValues, actions: int, generator: np.random.Generator) -> Pol
     """
 
     def policy(observation: np.ndarray, step: int) -> int:
+        """The best action, whatever the step."""
         row = check_width(values(observation), actions, f"at step {step}")
         return _pick(row, _best_value(row), generator.random())
 
@@ -127,7 +131,7 @@ def epsilon_greedy(
         greedy: decides otherwise.
         epsilon: probability of a random action.
         actions: A.
-        generator: of the random actions.
+        generator: draws the coins and the random actions.
         random_start: steps at the beginning of an episode that are all random.
 
     Returns:
@@ -135,6 +139,7 @@ def epsilon_greedy(
     """
 
     def policy(observation: np.ndarray, step: int) -> int:
+        """A random action, surely at first and later by chance; else the greedy one."""
         if step < random_start or generator.random() < epsilon:
             return int(generator.integers(actions))
         return greedy(observation, step)
@@ -147,13 +152,14 @@ def replay_then(recorded: Sequence[int] | np.ndarray, policy: Policy) -> Policy:
     actions = np.asarray(recorded).tolist()
 
     def replaying(observation: np.ndarray, step: int) -> int:
+        """The recorded action of the step while there is one, then the policy's."""
         return actions[step] if step < len(actions) else policy(observation, step)
 
     return replaying
 
 
 def play_several(
-    task: VectorTask,
+    task: Task,
     values: QValues,
     episodes: int,
     *,
@@ -169,7 +175,7 @@ def play_several(
         episodes: how many, at least 1.
         epsilon: probability of a random action instead.
         random_start: random actions at the beginning of each episode.
-        seed: of the random numbers, not negative.
+        seed: decides chance of the environment and random actions; not negative.
 
     Returns:
         The episodes; the first ones do not depend on how many follow.
@@ -183,7 +189,7 @@ def play_several(
             f"{epsilon}; at least 1, 0, 0 and a number in [0, 1] are needed"
         )
     stepper = task.make_stepper()
-    played = []
+    played: list[Episode] = []
     for number in range(episodes):
         generator = np.random.default_rng([seed, number])
         chance = generator.random()

@@ -3,18 +3,17 @@
 from pathlib import Path
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import TabularValues, load_values
 
 
-def load_network(task: VectorTask, path: str | Path) -> NetworkValues:
+def load_network(task: Task, path: str | Path) -> NetworkValues:
     """The network of a values file.
 
     Args:
-        task: the task that it must be of.
-        path: of the file.
+        task: whose observations, actions and name it must have.
+        path: where the file is.
 
     Raises:
         RequestError: if the file cannot be read, holds a table, or is of another task or shape.
@@ -31,12 +30,12 @@ def load_network(task: VectorTask, path: str | Path) -> NetworkValues:
     return values
 
 
-def load_table(task: TabularTask, path: str | Path) -> TabularValues:
+def load_table(task: Task, path: str | Path) -> TabularValues:
     """The table of a values file.
 
     Args:
-        task: the task whose states and actions it must have.
-        path: of the file.
+        task: whose states and actions it must have.
+        path: where the file is.
 
     Raises:
         RequestError: if the file cannot be read, holds a network, or a table of another shape.

@@ -9,17 +9,18 @@ actions again.
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import polars as pl
-from scipy.spatial import KDTree
+from scipy.spatial import KDTree  # pyright: ignore[reportMissingTypeStubs]
 
 from qbumpers.errors import RequestError
 from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, Policy, epsilon_greedy, greedy, play, replay_then
+from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.exact import reachable_states, solve
 from qbumpers.values.tabular import QValues, check_width
 
@@ -38,7 +39,7 @@ class Quality(NamedTuple):
         bias: mean of Q(s, a) minus the return achieved, over states that the policies visited.
         absolute: mean size of that difference.
         crash_value: mean Q of the very action that crashed; None if nothing did.
-        crash_return: the reward it brought.
+        crash_return: mean reward that this action brought; None if nothing crashed.
         overestimated: share of values above what was achieved.
     """
 
@@ -61,7 +62,7 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
             more than 1% hangs on what would have followed are unknown; nothing is bootstrapped.
 
     Returns:
-        float64 [T], NaN where unknown.
+        float64 [T], NaN if unknown.
     """
     returns, total = np.empty(len(rewards)), 0.0
     for step in range(len(rewards) - 1, -1, -1):
@@ -74,7 +75,7 @@ def returns_to_go(rewards: np.ndarray, discount: float, terminated: bool) -> np.
 
 
 def default_policies(
-    task: VectorTask, values: QValues, generator: np.random.Generator
+    task: Task, values: QValues, generator: np.random.Generator
 ) -> dict[str, Policy]:
     """Policies that leave the expert's path: greedy with several shares of random actions."""
     best = greedy(values, task.actions, generator)
@@ -85,7 +86,7 @@ def default_policies(
 
 
 def check_values(
-    task: VectorTask,
+    task: Task,
     values: QValues,
     *,
     discount: float,
@@ -96,13 +97,13 @@ def check_values(
     """Compare action values with what is achieved, in states that policies visit.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: any callable from an observation to a value per action.
-        discount: of the values.
+        discount: that the values state, in (0, 1].
         policies: that visit states, by name, for instance a learner's; if None, greedy ones with
             10%, 30% and all actions random. "greedy" is always among them.
-        episodes: of each policy, at least 2.
-        seed: of the random numbers, not negative.
+        episodes: how many each policy plays, at least 2.
+        seed: decides chance of the environment and random actions; not negative.
 
     Returns:
         A row per state and action compared: policy, episode, time (of the step, from 0),
@@ -124,7 +125,8 @@ def check_values(
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
     if policies is None:
         policies = default_policies(task, values, generator)
-    rows, path = [], []
+    rows: list[pl.DataFrame] = []
+    path: list[np.ndarray] = []
     for number in range(episodes):
         played = play(task, stepper, best, generator.random())
         every = dict.fromkeys(range(len(played.actions)), True)
@@ -143,9 +145,7 @@ def check_values(
     return found.drop("observation").with_columns(distance=pl.Series(distance))
 
 
-def branch(
-    task: VectorTask, stepper: Stepper, visited: Episode, place: int, policy: Policy
-) -> Episode:
+def branch(task: Task, stepper: Stepper, visited: Episode, place: int, policy: Policy) -> Episode:
     """Play an episode again up to and with step `place`, and go on by another policy."""
     return play(task, stepper, replay_then(visited.actions[: place + 1], policy), visited.chance)
 
@@ -190,7 +190,8 @@ def _distances(observations: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Distance of observations [N, D] to the nearest of a path [M, D], in standard deviations."""
     scale = observations.std(axis=0)
     scale[scale == 0] = 1
-    return KDTree(path / scale).query(observations / scale)[0]
+    tree: Any = KDTree(path / scale)
+    return tree.query(observations / scale)[0]
 
 
 def summarise(comparisons: pl.DataFrame) -> Quality:
@@ -240,7 +241,7 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
         (means over episodes, and the standard error of the bias), episodes.
     """
     known = comparisons.drop_nulls(["achieved", column])
-    rows = []
+    rows: list[dict[str, Any]] = []
     for low, high in itertools.pairwise(edges):
         inside = known.filter((pl.col(column) >= low) & (pl.col(column) < high))
         if inside.is_empty():
@@ -261,22 +262,23 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
     return pl.DataFrame(rows)
 
 
-def check_table(task: TabularTask, values: QValues, *, discount: float) -> pl.DataFrame:
+def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame:
     """Action values of a tabular task against the exact solution.
 
     Args:
-        task: the task.
+        task: what the values are of.
         values: any callable from the number of a state to a value per action.
-        discount: of the values.
+        discount: that the values state, in (0, 1].
 
     Returns:
         A row per state that an episode can act in and action: state, action, value, exact.
 
     Raises:
-        RequestError: if values are wrong or the exact ones do not exist.
+        RequestError: if the task has no table of transitions, values are wrong or the exact ones do
+            not exist.
     """
     exact = solve(task, discount).table
-    states = np.flatnonzero(reachable_states(task))
+    states = np.flatnonzero(reachable_states(cast(TabularTask, task)))
     claimed = np.stack([check_width(values(int(s)), task.actions, f"in state {s}") for s in states])
     return pl.DataFrame(
         {

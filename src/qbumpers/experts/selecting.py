@@ -1,4 +1,4 @@
-"""Training several experts by the paper's recipe, and keeping the best of them in a file."""
+"""Training several experts by the paper's recipe, and storing the best of them in a file."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from qbumpers.errors import checked
 from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
 from qbumpers.experts.training import Recipe
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 
@@ -30,7 +30,7 @@ class Selection(NamedTuple):
 
 
 def make_recipe(
-    task: VectorTask,
+    task: Task,
     *,
     steps: int,
     hidden: Sequence[int],
@@ -42,10 +42,10 @@ def make_recipe(
 
     Args:
         task: to be learned.
-        steps: of training.
+        steps: environment steps of training, of each expert.
         hidden: units of each hidden layer.
-        activation: of hidden units, "tanh" or "relu".
-        learning_rate: of Adam.
+        activation: what hidden units do, "tanh" or "relu".
+        learning_rate: step size of Adam.
         random_start: random actions before each episode of training.
 
     Raises:
@@ -62,7 +62,7 @@ def make_recipe(
 
 
 def train_best(
-    task: VectorTask,
+    task: Task,
     recipe: Recipe,
     seeds: Sequence[int],
     path: Path,
@@ -73,10 +73,10 @@ def train_best(
     Finished experts are in a folder beside the file, and are not trained again.
 
     Args:
-        task: the task.
-        recipe: of all of them.
-        seeds: of the random numbers, not negative.
-        path: of the file; "PATH.work" is the folder.
+        task: what they are to be good at.
+        recipe: how each of them is trained.
+        seeds: one per expert; each decides all chance of its training; not negative.
+        path: where the best goes; "PATH.work" is the folder of all.
         report: called with a seed and its steps done.
 
     Raises:

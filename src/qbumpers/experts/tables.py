@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.experts.quality import check_table
-from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import TabularValues
 
 
@@ -15,7 +15,7 @@ class TableCheck(NamedTuple):
     Attributes:
         start_values: V of each state that an episode may start in.
         pairs: number of states that an episode can act in, times actions: those compared.
-        largest_error: the largest size of an error.
+        largest_error: largest absolute difference from the exact value, in reward units.
         mean_error: mean of value minus exact value.
     """
 
@@ -25,15 +25,15 @@ class TableCheck(NamedTuple):
     mean_error: float
 
 
-def check_exactness(task: TabularTask, values: TabularValues) -> TableCheck:
+def check_exactness(task: Task, values: TabularValues) -> TableCheck:
     """Compare a table with the exact solution at its own discount.
 
     Args:
-        task: the task.
-        values: of the expert.
+        task: what the table is of.
+        values: the table that is checked, [S, A].
 
     Raises:
-        RequestError: if the exact values do not exist.
+        RequestError: if the task has no table of transitions or the exact values do not exist.
     """
     found = check_table(task, values, discount=values.discount)
     errors = (found["value"] - found["exact"]).to_numpy()

@@ -13,7 +13,8 @@ from qbumpers.learners.schedules import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED, finite
-from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 _REPORT_EVERY = 2_000  # steps
@@ -25,7 +26,7 @@ class Recipe(NamedTuple):
 
     Attributes:
         learner: the Double DQN; its schedule of epsilon runs over steps here, not episodes.
-        steps: of training.
+        steps: environment steps of training.
         random_start: random actions that every episode of training begins with.
     """
 
@@ -46,7 +47,7 @@ class Recipe(NamedTuple):
 
 
 def train_expert(
-    task: VectorTask,
+    task: Task,
     recipe: Recipe = Recipe(),  # noqa: B008 - immutable
     *,
     seed: int = 0,
@@ -57,27 +58,27 @@ def train_expert(
     Args:
         task: what it is to be good at.
         recipe: how it is trained.
-        seed: of all random streams, not negative.
+        seed: decides all chance of the training; not negative.
         report: called now and then with the steps done.
 
     Returns:
         The action values of the last step.
 
     Raises:
-        RequestError: if a number of the recipe is out of range, or the environment gives a
-            number that is not finite.
+        RequestError: if a number of the recipe is out of range, the task's states are numbered, or
+            the environment gives a number that is not finite.
     """
     if recipe.steps < 1 or recipe.random_start < 0 or seed < 0:
         raise RequestError(
             f"steps = {recipe.steps}, random_start = {recipe.random_start}, seed = {seed}; at "
             "least 1, 0 and 0 are needed"
         )
-    learner = recipe.learner
+    stepper, learner = task.make_stepper(), recipe.learner
     layout = learner.network.layout(task.observation_size, task.actions)
     content = ["train_expert", task.digest(), [[*learner, _OLD_PENALTY], *recipe[1:]]]
     streams = trial_streams(seed, content, range(1))[0]
     memory = make_memory(learner, layout, streams[LEARNER])
-    _train(task, recipe, memory, streams, report)
+    _train(task, stepper, recipe, memory, streams, report)
     return NetworkValues(
         network=learner.network,
         inputs=task.observation_size,
@@ -90,13 +91,13 @@ def train_expert(
 
 
 def _train(
-    task: VectorTask,
+    task: Task,
+    stepper: Stepper,
     recipe: Recipe,
     memory: DQNMemory,
     streams: np.ndarray,
     report: Callable[[int], None],
 ) -> None:
-    stepper = task.make_stepper()
     settings, schedule = as_numbers(recipe.learner), recipe.learner.epsilon
     rates = Rates(1.0, recipe.learner.learning_rate)
     observation, length = stepper.reset(draw(streams[ENVIRONMENT])), 0

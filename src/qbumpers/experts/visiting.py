@@ -10,7 +10,8 @@ from qbumpers.learners.schedules import scheduled
 from qbumpers.random_streams import ENVIRONMENT, EVALUATION, LEARNER, draw, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import TERMINATED
-from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 
 _EPISODES = 100  # of each learner
@@ -18,22 +19,20 @@ _EPSILONS = (0.1, 0.3, 0.6)  # of the expert's episodes, in turn
 _LONGEST_START = 100  # random actions that every other one of them may begin with
 
 
-def visited_episodes(
-    task: VectorTask, values: NetworkValues, learners: int, seed: int
-) -> list[Episode]:
+def visited_episodes(task: Task, values: NetworkValues, learners: int, seed: int) -> list[Episode]:
     """Episodes of unassisted learners, and as many epsilon-greedy ones of the expert, shuffled.
 
     Args:
         task: what is learned.
-        values: of the expert.
+        values: Q* of the expert, of which greedy actions are taken.
         learners: how many, each from its first episode on.
-        seed: of the random numbers, not negative.
+        seed: decides all that learners and policies draw; not negative.
 
     Returns:
         The episodes.
     """
     generator = np.random.default_rng([seed, 0])
-    visited = []
+    visited: list[Episode] = []
     for number in range(learners):
         streams = trial_streams(seed, ["evaluated", task.digest()], range(number, number + 1))[0]
         visited += _learning_episodes(task, values.discount, streams)
@@ -50,9 +49,9 @@ class _LearningStepper:
     """An environment whose every step a learner learns from.
 
     Args:
-        stepper: the environment.
-        settings: of the learner, as numbers.
-        memory: of the learner.
+        stepper: what is stepped.
+        settings: how the learner learns, as numbers.
+        memory: what the learner knows, changed in place after every step.
         stream: uint64 [4], random stream of its batches.
     """
 
@@ -78,7 +77,7 @@ class _LearningStepper:
         return observation, reward, event
 
 
-def _learning_episodes(task: VectorTask, discount: float, streams: np.ndarray) -> list[Episode]:
+def _learning_episodes(task: Task, discount: float, streams: np.ndarray) -> list[Episode]:
     """Episodes of a learner from its first on."""
     learner = DoubleDQN(discount=discount)
     layout = learner.network.layout(task.observation_size, task.actions)
@@ -87,7 +86,7 @@ def _learning_episodes(task: VectorTask, discount: float, streams: np.ndarray) -
     stepper = _LearningStepper(task.make_stepper(), settings, memory, streams[EVALUATION])
     nothing = np.zeros(task.observation_size, np.float32)
     propose = entered(choose, settings, memory, nothing, rates, streams[LEARNER])
-    episodes = []
+    episodes: list[Episode] = []
     for number in range(_EPISODES):
         now = rates._replace(epsilon=scheduled(learner.epsilon, number, _EPISODES))
 

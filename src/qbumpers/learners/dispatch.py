@@ -12,8 +12,9 @@ from numba import types
 from numba.extending import overload, register_jitable
 
 from qbumpers.compilation import INLINE, uncompiled
+from qbumpers.errors import RequestError
 from qbumpers.learners.interface import Shape, Transition
-from qbumpers.learners.registry import learner_for_settings
+from qbumpers.learners.registry import LearnerType, learner_for_settings
 
 
 def start(settings: Any, shape: Shape, stream: np.ndarray) -> Any:
@@ -34,14 +35,20 @@ def begin(settings: Any, memory: Any, episode: int, episodes: int) -> Any:
 
 def choose(settings: Any, memory: Any, state: Any, rates: Any, stream: np.ndarray) -> int:
     """The action that a learner means to take in training."""
-    return uncompiled(learner_for_settings(type(settings)).choose)(
-        settings, memory, state, rates, stream
-    )
+    kind = learner_for_settings(type(settings))
+    return _action(kind, "choose", uncompiled(kind.choose)(settings, memory, state, rates, stream))
 
 
 def prefer(settings: Any, memory: Any, state: Any, tie: float) -> int:
     """The action that a learner means to take in an unassisted probe."""
-    return uncompiled(learner_for_settings(type(settings)).prefer)(settings, memory, state, tie)
+    kind = learner_for_settings(type(settings))
+    return _action(kind, "prefer", uncompiled(kind.prefer)(settings, memory, state, tie))
+
+
+def _action(kind: LearnerType, which: str, found: Any) -> Any:
+    if not isinstance(found, int | float | np.number):
+        raise RequestError(f"learner {kind.name}: {which} returns {found!r}, not an action")
+    return found
 
 
 def policy(settings: Any, memory: Any, state: Any, rates: Any, out: np.ndarray) -> None:

@@ -24,17 +24,17 @@ class DoubleDQN(NamedTuple):
     """A Double DQN learner; its networks and replay live with the trial.
 
     Attributes:
-        network: its shape.
-        discount: of the learner's values.
+        network: shape of the network of its action values.
+        discount: gamma of the learner's own values, in (0, 1].
         epsilon: probability of a random action, by episode.
-        learning_rate: of Adam.
+        learning_rate: step size of Adam, in (0, 1].
         batch_size: transitions of an update.
         replay_size: transitions that are remembered.
-        learning_starts: steps before the first update; from then on there is one a step.
+        learning_starts: steps before the first update; from then on there is one per step.
         target_every: steps after which the target network is renewed.
         clip: what the norm of the gradient is clipped for: "global" (all parameters together),
             "variable" (each layer's weights and biases by themselves) or "none".
-        gradient_limit: of that norm.
+        gradient_limit: the norm to which a longer gradient is shortened.
     """
 
     network: Network = Network()
@@ -56,11 +56,11 @@ class DQNMemory(NamedTuple):
     """What a learner carries along, all arrays changed in place; float is float32 but in tests.
 
     Attributes:
-        layout: of its network.
-        parameters: float [P], of its network.
-        target: float [P], of the target network.
-        gradient: float [P].
-        moments: float [2, P], of Adam.
+        layout: sizes of its network.
+        parameters: float [P], weights and biases of its network.
+        target: float [P], those of the target network.
+        gradient: float [P], of the loss, in an update.
+        moments: float [2, P], first and second moments of Adam.
         replay: float32 [M, 2 D + 3], transitions: observation, next observation, action, reward,
             and 0 if the next state is terminal, else 1.
         counts: int64 [2], transitions seen and updates made.
@@ -85,10 +85,10 @@ def make_memory(
     """Networks, freshly initialised, and an empty replay.
 
     Args:
-        settings: of the learner.
-        layout: of its network.
+        settings: how it learns; of them the sizes of the replay and of a batch are used.
+        layout: sizes of its network.
         stream: uint64 [4], random stream of the initial weights.
-        precision: of the networks.
+        precision: type of the numbers of the networks.
 
     Returns:
         The memory.
@@ -174,7 +174,7 @@ def replay(settings: DoubleDQN, memory: DQNMemory, stream: np.ndarray) -> None:
     """One update from a batch drawn at random, once there is enough to draw from.
 
     Args:
-        settings: of the learner, as numbers.
+        settings: how the learner learns, as numbers.
         memory: changed in place.
         stream: uint64 [4], random stream of the batch.
     """
@@ -196,7 +196,7 @@ def update(settings: DoubleDQN, memory: DQNMemory, batch: np.ndarray) -> None:
     """One step of Adam on the Huber loss of given transitions.
 
     Args:
-        settings: of the learner, as numbers.
+        settings: how the learner learns, as numbers.
         memory: changed in place.
         batch: int64 [N], places in the replay.
     """
@@ -221,7 +221,7 @@ def loss_gradient(memory: DQNMemory, discount: float, batch: np.ndarray) -> None
 
     Args:
         memory: its `gradient` is overwritten.
-        discount: of the values.
+        discount: gamma of the targets, in (0, 1].
         batch: int64 [N], places in the replay.
     """
     layout = memory.layout

@@ -1,4 +1,4 @@
-"""What hosts and learners hand each other; `qbumpers.learners.registry` says who gets what."""
+"""What hosts and learners hand each other; `qbumpers.learners.registry` says which gets what."""
 
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ class Transition(NamedTuple):
     Attributes:
         state: where the step began: its number, or the observation, float32 [D].
         action: the action that it credits; -1 if it learns nothing.
-        reward: the reward that it believes it received.
+        reward: what it believes it received, in reward units.
         next_state: where it believes the action led.
         terminated: whether the episode ended there for good; a truncation is no end.
         next_action: the action that it proposed next, if a record tells; else -1.

@@ -32,7 +32,7 @@ def slipped(action: int, actions: int, chance: float) -> int:
     """One of the other actions.
 
     Args:
-        action: the one meant.
+        action: the action that was meant, in [0, A).
         actions: A, at least 2.
         chance: in [0, 1), which.
     """
@@ -46,7 +46,7 @@ def move(motor: Motor | None, meant: int, last: int, actions: int, stream: np.nd
 
     Args:
         motor: how it errs; None if it never does.
-        meant: the action meant.
+        meant: the action that the learner chose, in [0, A).
         last: what the hand did on the step before; -1 on the first step of an episode.
         actions: A.
         stream: uint64 [4], of the learner; in unassisted probes of the evaluation.

@@ -67,7 +67,7 @@ class Experience(NamedTuple):
 
     Attributes:
         action: the action that it credits; -1 if it learns nothing.
-        reward: the reward that it believes it received.
+        reward: what it believes it received, in reward units.
         led_back: whether it believes that the action led back to where the step began.
     """
 
@@ -85,7 +85,7 @@ def perceive(
     Args:
         perception: how it reads overridden steps; `credits` is `EXECUTED`, `PROPOSED` or `NOTHING`.
         proposed: its own action.
-        executed: the action that happened.
+        executed: the action that the environment received.
         undone: whether the state was taken back.
         reward: what the environment gave.
         coin: in [0, 1), whether an override is noticed.

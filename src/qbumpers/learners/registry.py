@@ -1,16 +1,18 @@
 """Learners by name: registering one, and checking the settings of one."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
-from qbumpers.compilation import is_of_package, result_type, type_of
+from qbumpers.borrowing import read_only
+from qbumpers.compilation import CompilationError, is_compiled, is_of_package, result_type, type_of
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.registration import (
+    check_arguments,
     checked_class,
     compiled_or_plain,
     fresh_class,
@@ -54,6 +56,16 @@ class LearnerType:
         functions = (self.start, self.choose, self.prefer, self.policy, self.learn, self.begin)
         return (*functions, original_class(self.settings_type))
 
+
+_ARGUMENTS = {
+    "start": ("settings", "shape", "stream"),
+    "choose": ("settings", "memory", "state", "rates", "stream"),
+    "prefer": ("settings", "memory", "state", "tie"),
+    "policy": ("settings", "memory", "state", "rates", "out"),
+    "learn": ("settings", "memory", "transition", "rates", "stream"),
+    "begin": ("settings", "memory", "episode", "episodes"),
+}
+_FUNCTIONS = tuple(_ARGUMENTS)
 
 _learners: dict[str, LearnerType] = {}
 _learners_by_settings: dict[type, LearnerType] = {}
@@ -101,31 +113,45 @@ def register_learner(
         The class of its settings, with which `simulate` takes it: call it with fields by name.
 
     Raises:
-        RequestError: if `settings_type` is no NamedTuple class or a field has no default.
+        RequestError: if `settings_type` is no NamedTuple class, a field has no default, or a
+            function takes other arguments.
     """
     checked_class(settings_type, f"settings_type of {name!r}")
     missing = set(settings_type._fields) - set(settings_type._field_defaults)  # type: ignore[attr-defined]
     if missing:
         raise RequestError(f"learner {name!r}: {', '.join(sorted(missing))} must have a default")
+    if observes not in get_args(Observes):
+        raise unknown_name(f"observes of learner {name!r}:", observes, get_args(Observes))
     functions = (start, choose, prefer, policy, learn, begin)
+    for (which, arguments), function in zip(_ARGUMENTS.items(), functions, strict=True):
+        if not (which == "begin" and function is None):
+            check_arguments(function, arguments, f"learner {name!r}: {which}")
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
     built_in = built_in and all(map(is_written_here, (settings_type, start, begin)))
-    compiled = True
-    if not built_in:
-        settings_type = fresh_class(settings_type, name, _remade)
-        attempt = partial(_compile_once, settings_type, observes)
-        functions, compiles_for = compiled_or_plain(
-            f"learner {name!r}", functions, {observes: attempt}
-        )
-        compiled = bool(compiles_for)
-    start, choose, prefer, policy, learn, begin = functions  # type: ignore[assignment]
     learner = LearnerType(
-        name, settings_type, start, choose, prefer, policy, learn, begin, observes, compiled,
-        built_in, revision,
-    )  # fmt: skip
+        name, settings_type, *functions, observes, is_compiled(choose), built_in, revision
+    )
+    if not built_in:
+        learner = _of_user(learner)
     _learners[name] = learner
-    _learners_by_settings[settings_type] = learner
-    return settings_type
+    _learners_by_settings[learner.settings_type] = learner
+    return learner.settings_type
+
+
+def _of_user(learner: LearnerType) -> LearnerType:
+    """A learner from outside the package: with settings of its own class, compiled if possible."""
+    settings_type = fresh_class(learner.settings_type, learner.name, _remade)
+    functions, compiles_for = compiled_or_plain(
+        f"learner {learner.name!r}",
+        tuple(getattr(learner, name) for name in _FUNCTIONS),
+        {learner.observes: partial(_compile_once, settings_type, learner.observes)},
+    )
+    return replace(
+        learner,
+        settings_type=settings_type,
+        compiled=bool(compiles_for),
+        **dict(zip(_FUNCTIONS, functions, strict=True)),
+    )
 
 
 def _compile_once(
@@ -134,7 +160,7 @@ def _compile_once(
 ) -> None:  # fmt: skip
     """Compile a learner for the types that every host passes, without calling it."""
     states = observes == "states"
-    state = 0 if states else np.zeros(1, np.float32)
+    state = 0 if states else read_only(np.zeros(1, np.float32))
     settings = type_of(sample(settings_type))
     stream, real, whole = type_of(np.zeros(4, np.uint64)), type_of(0.0), type_of(0)
     shape = Shape(1, 0, (0, 0)) if states else Shape(0, 1, (0, 0))
@@ -147,7 +173,7 @@ def _compile_once(
     )
     for name, found in zip(("choose", "prefer"), chosen, strict=True):
         if not str(found).startswith(("int", "uint")):
-            raise TypeError(f"{name} returns {found}, not a whole number")
+            raise CompilationError(f"{name} returns {found}, not a whole number")
     result_type(policy, *arguments, type_of(np.zeros(2)))
     transition = type_of(Transition(state, 0, 0.0, state, False, -1))
     result_type(learn, settings, memory, transition, rates, stream)

@@ -25,10 +25,10 @@ class Sarsa(NamedTuple):
     """A tabular learner of SARSA; its fields are those of `QLearner`.
 
     Attributes:
-        discount: of the learner's own values.
+        discount: gamma of the learner's own values, in (0, 1].
         epsilon: probability of a random action, by episode.
         learning_rate: step size, by episode.
-        initial_value: of every action in every state, in reward units.
+        initial_value: what every action in every state is worth at first, in reward units.
     """
 
     discount: Annotated[float, Field(gt=0, le=1)] = 1.0

@@ -29,7 +29,7 @@ class Network(NamedTuple):
 
     Attributes:
         hidden: units of each hidden layer.
-        activation: of hidden units, "tanh" or "relu".
+        activation: what hidden units do, "tanh" or "relu".
         dueling: units of each of the two streams of a dueling network; 0 for a plain one.
     """
 
@@ -85,13 +85,14 @@ def named_parameters(layout: Layout, parameters: np.ndarray) -> dict[str, np.nda
     """The parameters by name, as views: "hidden_1.weight" [inputs, outputs], "hidden_1.bias", ...
 
     Args:
-        layout: of the network.
+        layout: sizes of the network, which say where its parameters lie.
         parameters: float [P], flat.
 
     Returns:
         Views of `parameters`.
     """
-    named, offset = {}, 0
+    named: dict[str, np.ndarray] = {}
+    offset = 0
     for name, outputs, inputs in layout.layers():
         end = offset + outputs * inputs
         named[f"{name}.weight"] = parameters[offset:end].reshape(inputs, outputs)
@@ -104,7 +105,7 @@ def initialise(layout: Layout, parameters: np.ndarray, stream: np.ndarray) -> No
     """Weights uniform in +-sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), biases 0.
 
     Args:
-        layout: of the network.
+        layout: sizes of the network, which say where its parameters lie.
         parameters: float [P], overwritten.
         stream: uint64 [4], see `qbumpers.random_streams`.
     """
@@ -130,8 +131,8 @@ def forward(
     """Action values of a batch of states.
 
     Args:
-        layout: of the network.
-        parameters: float [P].
+        layout: sizes of the network, which say where its parameters lie.
+        parameters: float [P], weights and biases.
         workspace: float [`layout.workspace(states)` or more]; its first numbers are the
             observations [states, inputs], what follows is overwritten, for `backward`.
         states: N.
@@ -175,8 +176,8 @@ def values_of(
     """Action values of one observation.
 
     Args:
-        layout: of the network.
-        parameters: float [P].
+        layout: sizes of the network, which say where its parameters lie.
+        parameters: float [P], weights and biases.
         workspace: float [`layout.workspace(1)` or more], overwritten.
         observation: float32 [D].
 
@@ -210,8 +211,8 @@ def backward(
     """The gradient of a loss, by back-propagation.
 
     Args:
-        layout: of the network.
-        parameters: float [P].
+        layout: sizes of the network, which say where its parameters lie.
+        parameters: float [P], weights and biases.
         workspace: as `forward` left it.
         deltas: float [N, A], derivatives of the loss by the action values.
         deltas_workspace: float [`layout.workspace(N)`], overwritten.

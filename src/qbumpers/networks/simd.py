@@ -6,6 +6,9 @@ sum runs in one fixed order and every multiplication and addition is fused (roun
 wide the registers are. For matrices as small as a learner's that is also faster.
 """
 
+# llvmlite has no types, Numba few.
+# pyright: basic
+
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +18,8 @@ from numba import types
 from numba.core.cgutils import get_or_insert_function
 from numba.extending import intrinsic, models, register_model
 
-from qbumpers.compilation import compiled, compiled_apart
+from qbumpers.compilation import compiled, compiled_apart, compiles
+from qbumpers.networks import interpreted
 
 WIDE, NARROW, SCALAR = 32, 4, 1
 """How many numbers are worked on together, if so many are left."""
@@ -50,6 +54,8 @@ class _VectorModel(models.PrimitiveModel):
 
 def _instructions(build: Callable[..., Any]) -> Callable[..., Any]:
     """A function whose calls become a few instructions, built from the types of its arguments."""
+    if not compiles():
+        return getattr(interpreted, build.__name__)
     return intrinsic(prefer_literal=True)(build)
 
 
@@ -59,6 +65,7 @@ def zeros(typing: Any, numbers: Any, width: Any) -> Any:
     vector = Vector(numbers.dtype, width.literal_value)
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The zeros as a constant of LLVM."""
         return ir.Constant(context.get_value_type(vector), None)
 
     return vector(numbers, width), build
@@ -69,6 +76,7 @@ def load(typing: Any, numbers: Any, at: Any, like: Any) -> Any:
     """Numbers of a contiguous array from a place on, as many as `like` has."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One load of all the numbers."""
         pointer = _pointer(context, builder, numbers, arguments, like)
         return builder.load(pointer, align=numbers.dtype.bitwidth // 8)
 
@@ -80,6 +88,7 @@ def store(typing: Any, numbers: Any, at: Any, vector: Any) -> Any:
     """Write a vector into a contiguous array from a place on."""
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One store of all the numbers."""
         pointer = _pointer(context, builder, numbers, arguments, vector)
         builder.store(arguments[2], pointer, align=numbers.dtype.bitwidth // 8)
         return context.get_dummy_value()
@@ -99,6 +108,7 @@ def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
     number = total.number if isinstance(total, Vector) else total
 
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """One fused multiply-add of all lanes; a plain number stands in each of them."""
         kind = arguments[2].type
         splats = [_splat(builder, value, kind) for value in arguments]
         suffix = f"f{number.bitwidth}"
@@ -110,6 +120,7 @@ def multiply_add(typing: Any, factor: Any, other: Any, total: Any) -> Any:
         return builder.call(fused, splats)
 
     def suited(given: Any) -> Any:
+        """The type of an argument: a vector stays, any number becomes one like `total`'s."""
         return given if isinstance(given, Vector) else number
 
     return total(suited(factor), suited(other), total), build

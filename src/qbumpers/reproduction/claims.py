@@ -15,7 +15,7 @@ from qbumpers.analysis.formatting import format_number
 from qbumpers.analysis.page.elements import Column, Section, Table, interval, unbroken
 from qbumpers.analysis.statistics import IntervalEstimate
 
-HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be told from these trials"
+HOLDS, FAILS, OPEN = "holds", "does not hold", "cannot be decided from these trials"
 """Verdicts."""
 
 CLAIMS = "claims.csv"
@@ -52,7 +52,7 @@ class Claim(NamedTuple):
     """A claim, and what the trials say about it.
 
     Attributes:
-        title: the claim in short.
+        title: the claim in a few words.
         rule: when it holds.
         every: whether it is about every setting (True) or about some setting (False).
         evidence: a row per setting and estimate.
@@ -131,7 +131,7 @@ def _evidence_rows(claim: Claim) -> list[dict[str, Any]]:
 
 
 def claims_section(claims: Sequence[Claim], note: str = "") -> Section:
-    """The section of a report that tells every claim, its verdict and the evidence.
+    """The section of a report that shows every claim, its verdict and the evidence.
 
     Args:
         claims: at least one.

@@ -51,7 +51,7 @@ def agrees(published: float, spread: float, measured: IntervalEstimate) -> bool 
     interval wider by the square root of two.
 
     Args:
-        published: the printed number.
+        published: the number as the paper prints it.
         spread: how far printing leaves it open.
         measured: with its 95% interval.
 
@@ -90,7 +90,7 @@ def compare(
 
     Args:
         numbers: from `printed_numbers`.
-        summary: the table of `summary.csv`.
+        summary: a row per condition, from `qbumpers.analysis.measures.summary`.
         regrets: by what is matched, "performance" and "learning".
 
     Returns:

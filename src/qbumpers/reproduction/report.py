@@ -17,8 +17,8 @@ def additions(results: Results, findings: Findings) -> Additions:
     """What the paper adds to a report; nothing if the experiment reproduces none.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
     """
     name = results.experiment.reproduces
     if name is None:
@@ -48,7 +48,7 @@ def write_report(
     """Analyse a run, published or not: `qbumpers.analysis.report.write_report`.
 
     Args:
-        folder: of the run.
+        folder: output folder of the run, a path or a URL.
         advance: called with the name of each part before it is made.
 
     Returns:

@@ -1,12 +1,14 @@
 """What a trial needs, checked before any of it runs."""
 
 import hashlib
+import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant, assistant_of
+from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
@@ -59,11 +61,11 @@ class Condition(NamedTuple):
 
     Attributes:
         task: what is to be learned.
-        values: Q* of the assistant; float64 [S, A] of a task with a table, else a network.
+        values: Q* of the assistant; float64 [S, A] if the task has a table, else a network.
         others: the further rows of values that the assistant's rule named, float64 [S, K, A], or
             networks.
-        discount: of those values.
-        assistant: that helps.
+        discount: gamma of those values, in (0, 1].
+        assistant: what helps in the first `episodes`.
         learner: settings of the simulated learner.
         perception: what it believes happened, or the name of that.
         penalty: of a named perception that includes disruption, in reward units.
@@ -108,16 +110,17 @@ class Condition(NamedTuple):
         return found._replace(penalty=self.penalty) if found.penalty else found
 
     def model(self) -> Model:
-        """What a rule with memory is told of the task."""
+        """What a rule with memory may know of the task."""
         task = self.task
+        dynamics = task.dynamics() if task.states else None
         return Model(
             task.states,
             task.observation_size,
             task.actions,
             task.no_op,
             self.discount,
-            task.dynamics() if task.states else None,
-            task.distance,
+            read_only(dynamics),
+            read_only(task.distance),
         )
 
     def content(self) -> dict[str, Any]:
@@ -227,7 +230,21 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
         setup.get("common_random_numbers", False),
     )
     _check_numbers(condition)
+    _check_kept(f"options of assistant {helper.name}", helper.described())
+    _check_kept(f"learner {condition.learner_type.name}", _plain(condition.learner))
     return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
+
+
+def _check_kept(where: str, settings: dict[str, Any]) -> None:
+    """Check that settings can be written: they name results and seed random streams."""
+    for field, value in settings.items():
+        try:
+            json.dumps(value)
+        except (TypeError, ValueError) as error:
+            raise RequestError(
+                f"{where}: {field} = {value!r}; only numbers, texts, lists and tables of them, and "
+                "Files of numbers, can be kept with results"
+            ) from error
 
 
 def _check_numbers(condition: Condition) -> None:
@@ -290,20 +307,14 @@ def _checked_network(
             f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
+    found = (values.inputs, values.actions)
+    if found != (task.observation_size, task.actions):
+        raise RequestError(
+            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
+            f"{task.name} needs {task.observation_size} and {task.actions}"
+        )
+    # They have the shape of Q*, or there would be no such values.
     others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    for network in (values, *others):
-        found = (network.inputs, network.actions)
-        if found != (task.observation_size, task.actions):
-            raise RequestError(
-                f"values of {network.task}: a network of {found[0]} inputs and {found[1]} actions; "
-                f"task {task.name} needs {task.observation_size} and {task.actions}"
-            )
-    for network in others:
-        if network.layout != values.layout:
-            raise RequestError(
-                f"values of {values.task}: further values must come from a network of the same "
-                "shape as Q*"
-            )
     return values, others, values.discount
 
 
@@ -331,7 +342,7 @@ def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | Non
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:
-    """Room for the outcomes of so many trials."""
+    """Arrays [T, E] for the outcomes of so many trials, to be filled."""
     kinds = (np.float64, np.float64, np.int32, np.int32, np.int32, np.uint8, np.uint8)
     shape = (trials, condition.episodes + condition.retention)
     return Outcomes(*(np.zeros(shape, kind) for kind in kinds))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from qbumpers.compilation import compiled_for_session, entered, hold, uncompiled
-from qbumpers.decisions import Step, checked_action
+from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
 from qbumpers.learners.dispatch import start as start_learner
@@ -23,21 +23,20 @@ from qbumpers.simulation.deep_steps import (
     take,
 )
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation
-from qbumpers.tasks import VectorTask
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 
-REVISION = 1
+REVISION: int = 1
 """Raised when trials give other numbers by anything that is no rule, learner or task."""
 
-PRECISION = "float32"
+PRECISION: str = "float32"
 
 _ENDED = TERMINATED | TRUNCATED
 
-_SESSION = {f: compiled_for_session(uncompiled(f)) for f in (act, take, preferred)}
+_SESSION = {f: compiled_for_session(uncompiled(f)) for f in (hold, act, take, preferred)}
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    """Simulate trials of a condition, one after another on one core."""
+    """Simulate trials: `run_block` of `qbumpers.simulation.trials.Engine`."""
     outcomes = outcome_room(condition, len(trials))
     _run_trials(condition, trials, seed, outcomes, None, None)
     return Simulation(outcomes, None)
@@ -50,15 +49,7 @@ def record(
     script: Script | None,
     interpreted: bool = False,
 ) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more.
-
-    Args:
-        condition: to simulate.
-        trials: the one trial.
-        seed: of the experiment.
-        script: to be played again; or None.
-        interpreted: whether to call the pieces of a step as plain Python, to be compared with.
-    """
+    """Every step of training of one trial: `record` of `qbumpers.simulation.trials.Engine`."""
     rows: list[Step] = []
     _run_trials(condition, trials, seed, outcome_room(condition, 1), rows, script, interpreted)
     kinds = Step(
@@ -100,7 +91,7 @@ class _Trial:
 
     Args:
         condition: what is simulated.
-        number: of the trial, for messages.
+        number: which trial, for messages.
         each: uint64 [1 or E, 4, 4], streams, of the whole trial or of each episode.
         rows: step records are appended; or None.
         script: played again; or None.
@@ -116,7 +107,7 @@ class _Trial:
         script: Script | None,
         interpreted: bool,
     ) -> None:
-        task = cast(VectorTask, condition.task)
+        task = condition.task
         self._condition, self._task = condition, task
         self._stepper, self._number = task.make_stepper(), number
         self._each, self._streams = each, each[0].copy()
@@ -138,39 +129,43 @@ class _Trial:
 
     def _entered(self, assisted: bool) -> _Calls:
         """The calls of a step, compiled unless the rule or the learner cannot be."""
-        assistant, learner = self._condition.assistant, self._condition.learner_type
-        calls = (act, take, preferred)
-        if not (assistant.built_in and learner.built_in):
-            calls = tuple(_SESSION[each] for each in calls)
-        if not self._compiled:
-            calls = tuple(map(uncompiled, calls))
-        common = self._common(assisted)
+        calls = tuple(map(self._kind, (act, take, preferred)))
+        begun = (self._common(), self._options(assisted), self._rule_memory)
         observation = np.zeros(self._task.observation_size, np.float32)
         script = None if self._script is None else (0, 0.0, 0.0)
         chosen, outcome = (0, 0, False, 0.0, 0.0, 0.0), (observation, 0.0, 0, 0)
         return _Calls(
-            entered(calls[0], common, self._rule_memory, observation, 0, script),
-            entered(calls[1], common, self._rule_memory, observation, chosen, outcome),
-            entered(calls[2], common, observation, 0.0, 0, True),
+            entered(calls[0], *begun, observation, 0, script),
+            entered(calls[1], *begun, observation, chosen, outcome),
+            entered(calls[2], begun[0], observation, 0.0, 0, True),
         )
 
-    def _common(self, assisted: bool) -> Any:
+    def _kind(self, function: Any) -> Any:
+        """A function of a step: compiled with the package, in this process, or not at all."""
+        if not self._compiled:
+            return uncompiled(function)
+        ours = self._condition.assistant.built_in and self._condition.learner_type.built_in
+        return function if ours else _SESSION[function]
+
+    def _common(self) -> Any:
         """What the steps of an episode have in common."""
         pieces = Pieces(
             settings=self._settings, memory=self._memory, rates=self._rates, motor=self._motor,
             perception=self._perception, assistance=self._assistance,
-            options=self._condition.assistant.numbers if assisted else None,
             numbers=self._numbers, streams=self._streams,
         )  # fmt: skip
-        return hold(pieces) if self._compiled else Common(pieces)
+        return self._kind(hold)(pieces) if self._compiled else Common(pieces)
+
+    def _options(self, assisted: bool) -> Any:
+        return self._condition.assistant.numbers if assisted else None
 
     def run_episodes(self, episode: int, outcomes: Outcomes, place: int) -> None:
         """An episode of training, then a greedy unassisted one.
 
         Args:
-            episode: its number.
-            outcomes: filled.
-            place: of the trial among them.
+            episode: which one of the trial, counted from 0.
+            outcomes: arrays [T, E], of which the elements of this episode are filled.
+            place: row of the trial in them.
         """
         if episode and len(self._each) > 1:
             self._streams[:] = self._each[episode]
@@ -188,7 +183,7 @@ class _Trial:
         assisted = episode < condition.episodes
         self._rates = begin_learner(condition.learner, self._memory, episode, condition.episodes)
         self._numbers[:] = 0.0, 1.0, 0.0, episode, 0
-        calls, common = self._calls[assisted], self._common(assisted)
+        calls, common, options = self._calls[assisted], self._common(), self._options(assisted)
         observation = self._begin(self._streams[ENVIRONMENT], episode)
         total, overrides, events, length, last = 0.0, 0, 0, 0, -1
         while length < limit and not events & _ENDED:
@@ -197,11 +192,10 @@ class _Trial:
                 if self._played == len(self._script.proposed):
                     break
                 script = self._scripted()
-            chosen = calls.act(common, self._rule_memory, observation, last, script)
+            chosen = calls.act(common, options, self._rule_memory, observation, last, script)
             if length == 0:
                 condition.assistant.check_start(float(self._numbers[START_VALUE]))
             last, executed, undone = chosen[:3]
-            checked_action(executed, self._task.actions)
             next_observation, reward, event, after = self._environment_step(
                 observation, executed, undone
             )
@@ -209,7 +203,7 @@ class _Trial:
             happened = event & ~_ENDED if undone else event
             happened |= LIMIT if length == limit and not happened & _ENDED else 0
             credited, projected, self._rule_memory, sound = calls.take(
-                common, self._rule_memory, observation, chosen,
+                common, options, self._rule_memory, observation, chosen,
                 (next_observation, reward, event, happened),
             )  # fmt: skip
             if not sound:
@@ -250,7 +244,7 @@ class _Trial:
         """Return, length and events of an unassisted episode without exploration or learning."""
         stepper, stream = self._stepper, self._streams[EVALUATION]
         prefer = self._calls[True].preferred
-        common = self._common(assisted=True)
+        common = self._common()
         limit = self._task.episode_limit
         observation = self._begin(stream, episode)
         action = prefer(common, observation, 0.0, -1, False)

@@ -9,17 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.assistants.dispatch import decide, observe, undoes
+from qbumpers.borrowing import read_only
 from qbumpers.choice import best_value
 from qbumpers.compilation import compiled_apart, inlined
 from qbumpers.decisions import (
     Account,
     Execution,
     Noise,
+    execution_of,
+    is_action,
     projected_return,
     settle,
     situate,
     step_of,
 )
+from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import choose, learn, prefer
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
@@ -38,12 +42,12 @@ class NetworkAssistance(NamedTuple):
     """The assistant of a learner that observes vectors.
 
     Attributes:
-        layout: of the network of its values.
+        layout: sizes of the network of its values.
         parameters: float32 [1 + K, P], of Q* and of the further rows that its rule named.
-        workspace: float32, of the network.
+        workspace: float32, what the network needs for one observation.
         row: float64 [A], filled with Q*(s, .).
         other_rows: float64 [K, A], filled with the further rows.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
     """
 
     layout: Layout
@@ -58,14 +62,12 @@ class Pieces(NamedTuple):
     """What the steps of a learner have in common.
 
     Attributes:
-        settings: of the learner, as numbers.
-        memory: of the learner, changed in place.
-        rates: of the learner, in this episode.
+        settings: how the learner learns, as numbers; their type selects the learner.
+        memory: what the learner knows, changed in place.
+        rates: the learner's exploration and step size in this episode.
         motor: how the learner's hand errs, a `Motor` as numbers; or None.
         perception: as numbers.
         assistance: its rows are filled by `act`.
-        options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
-            there.
         numbers: float64 [5], the account of the episode; its start value is filled on the first
             step.
         streams: uint64 [4, 4], of the trial.
@@ -77,7 +79,6 @@ class Pieces(NamedTuple):
     motor: Any
     perception: Any
     assistance: NetworkAssistance
-    options: Any
     numbers: np.ndarray
     streams: np.ndarray
 
@@ -99,9 +100,9 @@ class Chosen(NamedTuple):
         proposed: as in `Step`, like the rest.
         executed: checked by the host.
         undone: whether the state is to be taken back.
-        probability: of an override.
-        coin: of the noise.
-        tie: of the noise.
+        probability: that the rule gave an override, in [0, 1].
+        coin: the noise that decided whether to override.
+        tie: the noise that chose among equally good actions.
     """
 
     proposed: int
@@ -117,8 +118,8 @@ class Outcome(NamedTuple):
 
     Attributes:
         next_observation: float32 [D].
-        reward: of the step.
-        events: bits of `qbumpers.tasks.dynamics`, as the environment told them.
+        reward: what the environment gave.
+        events: bits of `qbumpers.tasks.dynamics`, as the environment gave them.
         happened: the same for the record: of an undone step without its end, of the last step that
             is allowed with `LIMIT`.
     """
@@ -143,13 +144,15 @@ def _account(numbers: np.ndarray) -> Account:
 
 @compiled_apart
 def act(
-    common: Any, rule_memory: Any, observation: np.ndarray, last: int, script: Any
+    common: Any, options: Any, rule_memory: Any, observation: np.ndarray, last: int, script: Any
 ) -> tuple[int, int, bool, float, float, float]:
     """The learner proposes an action and the assistant decides.
 
     Args:
         common: holds `Pieces`.
-        rule_memory: of the assistant's rule.
+        options: of the assistant's rule, as numbers; their type selects it. None if no assistant is
+            there. (By itself: compilation leaves out what is not there only for arguments.)
+        rule_memory: what the assistant's rule remembers; 0 if that is nothing.
         observation: float32 [D].
         last: what the learner proposed on the step before; -1 on the first.
         script: proposed action, coin and tie to be played again; or None.
@@ -157,8 +160,9 @@ def act(
     Returns:
         The fields of `Chosen`.
     """
-    settings, memory, rates, motor, _, assistance, options, numbers, streams = common.content
+    settings, memory, rates, motor, _, assistance, numbers, streams = common.content
     row, other_rows = assistance.row, assistance.other_rows
+    observation = read_only(observation)
     actions, others = len(row), len(other_rows)
     for place in range(others + 1):  # in one loop, so that the network is compiled in once
         parameters = assistance.parameters[place]
@@ -173,40 +177,44 @@ def act(
     if script is None:
         meant = choose(settings, memory, observation, rates, streams[LEARNER])
         proposed = move(motor, meant, last, actions, streams[LEARNER])
+        if not is_action(proposed, actions):
+            raise RequestError("the learner's action is not a whole number in [0, actions)")
         noise = Noise(draw(streams[ASSISTANT]), draw(streams[ASSISTANT]))
     else:
         proposed, noise = script[0], Noise(script[1], script[2])
     if options is None:
         return proposed, proposed, False, 0.0, noise.coin, noise.tie
-    situation = situate(_account(numbers), observation, row, other_rows, proposed)
+    situation = situate(
+        _account(numbers), observation, read_only(row), read_only(other_rows), proposed
+    )
     decision = decide(situation, noise, options, rule_memory)
-    return (
-        proposed, int(decision.action), undoes(decision), float(decision.probability),
-        noise.coin, noise.tie,
-    )  # fmt: skip
+    executed, undone, probability = execution_of(decision, undoes(decision), actions)
+    return proposed, executed, undone, probability, noise.coin, noise.tie
 
 
 @compiled_apart
 def take(
-    common: Any, rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any
+    common: Any, options: Any, rule_memory: Any, observation: np.ndarray, chosen: Any, outcome: Any
 ) -> tuple[int, float, Any, bool]:
     """The learner learns from a step, and the account and the rule's memory take it in.
 
     Args:
         common: holds `Pieces`, as `act` left them.
-        rule_memory: of the assistant's rule.
+        options: as for `act`.
+        rule_memory: what the assistant's rule remembers; 0 if that is nothing.
         observation: float32 [D], where the step began.
         chosen: what `act` returned.
-        outcome: the fields of `Outcome`.
+        outcome: what the environment answered, the fields of `Outcome`.
 
     Returns:
         The action that the learner credits (-1 for none), the projected return of its proposal, the
         rule's memory, and whether reward and observation are finite; if they are not, nothing was
         learned.
     """
-    settings, memory, rates, _, perception, assistance, options, numbers, streams = common.content
+    settings, memory, rates, _, perception, assistance, numbers, streams = common.content
     proposed, executed, undone, probability, coin, tie = chosen
     next_observation, reward, events, happened = outcome
+    observation, next_observation = read_only(observation), read_only(next_observation)
     account = _account(numbers)
     overridden = executed != proposed or undone
     experience = perceive(
@@ -219,7 +227,10 @@ def take(
         return experience.action, projected, rule_memory, False
     if options is not None:
         step = step_of(
-            situate(account, observation, assistance.row, assistance.other_rows, proposed),
+            situate(
+                account, observation, read_only(assistance.row), read_only(assistance.other_rows),
+                proposed,
+            ),
             Noise(coin, tie), Execution(executed, undone, probability), experience.action, reward,
             next_observation, happened,
         )  # fmt: skip
@@ -241,18 +252,21 @@ def preferred(common: Any, observation: np.ndarray, reward: float, last: int, ov
     Args:
         common: holds `Pieces`.
         observation: float32 [D].
-        reward: that came with it.
+        reward: what came with the observation.
         last: the action before it; -1 at the beginning.
         over: whether the episode has ended; then the action means nothing.
 
     Returns:
         The action; `NOT_FINITE` if the observation or the reward is not finite.
     """
-    settings, memory, _, motor, _, assistance, _, _, streams = common.content
+    settings, memory, _, motor, _, assistance, _, streams = common.content
     if not finite(reward, observation):
         return NOT_FINITE
     if over:
         return 0
     stream = streams[EVALUATION]
-    meant = prefer(settings, memory, observation, draw(stream))
-    return move(motor, meant, last, len(assistance.row), stream)
+    meant = prefer(settings, memory, read_only(observation), draw(stream))
+    done = move(motor, meant, last, len(assistance.row), stream)
+    if not is_action(done, len(assistance.row)):
+        raise RequestError("the learner's action is not a whole number in [0, actions)")
+    return done

@@ -10,7 +10,7 @@ import numpy as np
 
 from qbumpers.assistants.dispatch import decide, observe, undoes
 from qbumpers.assistants.dispatch import start as start_rule
-from qbumpers.borrowing import borrow, hold, row, rows
+from qbumpers.borrowing import borrow, hold, row
 from qbumpers.compilation import compiled, compiled_for_session, inlined, uncompiled
 from qbumpers.decisions import (
     Execution,
@@ -18,11 +18,13 @@ from qbumpers.decisions import (
     Noise,
     Step,
     begin,
-    checked_action,
+    execution_of,
+    is_action,
     settle,
     situate,
     step_of,
 )
+from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
 from qbumpers.learners.dispatch import choose, forget, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
@@ -43,7 +45,7 @@ class Assistance(NamedTuple):
         values: float64 [S, A], Q* by state.
         others: float64 [S, K, A], the further rows that the rule named.
         seen: int64 [S], what the assistant sees of each state; None if it sees the state.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
         options: of the rule, as numbers; their type selects it.
         width: a tuple of A integers, see `qbumpers.borrowing.row`.
     """
@@ -145,8 +147,10 @@ def _propose(
     if script is None:
         meant = choose(learner.settings, memory, state, rates, streams[LEARNER])
         proposed = move(learner.motor, meant, last, actions, streams[LEARNER])
+        if not is_action(proposed, actions):
+            raise RequestError("the learner's action is not a whole number in [0, actions)")
         noise = streams[ASSISTANT]
-        return proposed, Noise(draw(noise), draw(noise))
+        return int(proposed), Noise(draw(noise), draw(noise))
     return script.proposed[recorded], Noise(script.coin[recorded], script.tie[recorded])
 
 
@@ -179,15 +183,12 @@ def _assisted_episode(
         )
         situation = situate(
             account, _seen(assistance.seen, state), row(assistance.values, state, width),
-            rows(assistance.others, state, width), proposed,
+            row(assistance.others, state, width), proposed,
         )  # fmt: skip
         execution = Execution(proposed, False, 0.0)
         if when.assisted:
             decision = decide(situation, noise, assistance.options, rule_memory)
-            execution = Execution(
-                checked_action(int(decision.action), dynamics.actions), undoes(decision),
-                float(decision.probability),
-            )  # fmt: skip
+            execution = execution_of(decision, undoes(decision), dynamics.actions)
         index = transition(dynamics, state, execution.executed, _chance(dynamics.outcomes, nature))
         reward, event = dynamics.reward[index], int(dynamics.events[index])
         next_state = dynamics.next_state[index]
@@ -240,6 +241,8 @@ def _greedy_episode(
     while length < dynamics.episode_limit:
         meant = prefer(learner.settings, memory, state, draw(stream))
         last = move(learner.motor, meant, last, dynamics.actions, stream)
+        if not is_action(last, dynamics.actions):
+            raise RequestError("the learner's action is not a whole number in [0, actions)")
         _count_unassisted(sinks.counts, state, when.assisted)
         index = transition(dynamics, state, last, _chance(dynamics.outcomes, stream))
         total += dynamics.reward[index]
@@ -282,9 +285,9 @@ def run_trials(
     exploration and learning rate that the schedules end with.
 
     Args:
-        model: of the task, with its dynamics.
-        assistance: of the trials.
-        learner: that is simulated.
+        model: what is to be learned, with its dynamics.
+        assistance: what helps in them.
+        learner: what is simulated, with what lies around it.
         streams: uint64 [T, 1, 4, 4] or, to begin anew in every episode, [T, E, 4, 4], see
             `qbumpers.random_streams`.
         retention: R, of the E episodes.
@@ -294,7 +297,8 @@ def run_trials(
         Number of steps of training.
 
     Raises:
-        RequestError: if the rule chooses an action that there is not.
+        RequestError: if the rule or the learner chooses an action that there is not, or the rule
+            gives a probability outside [0, 1].
     """
     trials, episodes = sinks.outcomes.assisted_return.shape
     training = episodes - retention

@@ -11,8 +11,8 @@ class Outcomes(NamedTuple):
     """What happened, by trial and episode.
 
     Attributes:
-        assisted_return: float64 [T, E], undiscounted, of the training episode with help.
-        unassisted_return: float64 [T, E], of the greedy episode without help that follows it.
+        assisted_return: float64 [T, E], undiscounted, of the assisted training episode.
+        unassisted_return: float64 [T, E], of the greedy unassisted episode that follows it.
         assisted_length: int32 [T, E], steps.
         unassisted_length: int32 [T, E], steps.
         overrides: int32 [T, E], steps on which another action than the learner's was executed.
@@ -57,7 +57,7 @@ class Sinks(NamedTuple):
     Attributes:
         outcomes: `Outcomes` of arrays [T, E].
         counts: `StateCounts`, added to; or None.
-        record: `Step` of arrays [N] with room for every step of training, filled; or None.
+        record: `Step` of arrays [N], as many as there can be steps of training, filled; or None.
         script: `Script` to be played again; or None.
     """
 
@@ -71,7 +71,7 @@ def room_for_steps(most: int, state: np.ndarray, actions: int) -> Step:
     """A table of steps to be filled.
 
     Args:
-        most: N, steps that there is room for.
+        most: N, how many steps it can hold.
         state: a state as the table keeps it: int64 [], or float32 [D].
         actions: A.
 
@@ -99,7 +99,7 @@ class Simulation(NamedTuple):
 
     Attributes:
         outcomes: by trial and episode, arrays [T, E].
-        counts: by state, over all trials; None where observations are vectors.
+        counts: by state, over all trials; None if observations are vectors.
     """
 
     outcomes: Outcomes
@@ -107,5 +107,5 @@ class Simulation(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Steps that the learners took, with help and without."""
+        """Steps that the learners took, assisted and unassisted."""
         return int(self.outcomes.assisted_length.sum() + self.outcomes.unassisted_length.sum())

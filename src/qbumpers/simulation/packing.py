@@ -28,7 +28,7 @@ class _Function(NamedTuple):
 
 
 class _Registration(NamedTuple):
-    """What `register_assistant` or `register_learner` was told.
+    """What `register_assistant` or `register_learner` was given.
 
     Attributes:
         settings_type: options of a rule, settings of a learner.
@@ -46,7 +46,7 @@ class Own:
 
     Args:
         rules: any; those of this package are left out.
-        kinds: of learners, likewise.
+        kinds: registered kinds of learners, likewise.
     """
 
     def __init__(self, rules: Iterable[Rule], kinds: Iterable[LearnerType]) -> None:
@@ -124,15 +124,15 @@ def _register_all(packed: tuple[tuple[bool, str, bytes], ...]) -> None:
         _received[is_rule, name] = content, known()[name]
 
 
-def _register(is_rule: bool, name: str, told: _Registration) -> None:
-    functions = {each: _rebuilt(function) for each, function in told.functions.items()}
+def _register(is_rule: bool, name: str, given: _Registration) -> None:
+    functions = {each: _rebuilt(function) for each, function in given.functions.items()}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # it was said where it was registered first
         if is_rule:
             decide = functions.pop("decide")
-            register_assistant(name, told.settings_type, **functions, **told.others)(decide)
+            register_assistant(name, given.settings_type, **functions, **given.others)(decide)
         else:
-            register_learner(name, told.settings_type, **functions, **told.others)
+            register_learner(name, given.settings_type, **functions, **given.others)
 
 
 def _dumped(things: Any, own: Iterable[Rule | LearnerType]) -> bytes:

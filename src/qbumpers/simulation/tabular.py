@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from qbumpers.borrowing import read_only
 from qbumpers.compilation import uncompiled
 from qbumpers.decisions import Step
 from qbumpers.simulation.condition import Condition, compiled_learner, outcome_room, streams
@@ -15,15 +16,15 @@ from qbumpers.simulation.loops import (
 )
 from qbumpers.simulation.outcomes import Script, Simulation, Sinks, StateCounts, room_for_steps
 
-REVISION = 1
+REVISION: int = 1
 """Raised when trials give other numbers by anything that is no rule, learner or task: the loops,
 the streams, the account of an episode, perception, motor noise, forgetting."""
 
-PRECISION = "float64"
+PRECISION: str = "float64"
 
 
 def run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    """Simulate trials of a condition, one after another in compiled code."""
+    """Simulate trials: `run_block` of `qbumpers.simulation.trials.Engine`."""
     outcomes = outcome_room(condition, len(trials))
     counts = StateCounts(*(np.zeros(condition.task.states, np.int64) for _ in range(3)))
     _call_loops(condition, trials, seed, Sinks(outcomes, counts, None, None))
@@ -37,15 +38,7 @@ def record(
     script: Script | None,
     interpreted: bool = False,
 ) -> Step:
-    """Every step of training of one trial; `qbumpers.simulation.record` says more.
-
-    Args:
-        condition: to simulate.
-        trials: the one trial.
-        seed: of the experiment.
-        script: to be played again; or None.
-        interpreted: whether to run the loops as plain Python, to be compared with.
-    """
+    """Every step of training of one trial: `record` of `qbumpers.simulation.trials.Engine`."""
     most = (condition.episodes + condition.retention) * condition.task.episode_limit
     steps = room_for_steps(most, np.zeros((), np.int64), condition.task.actions)
     sinks = Sinks(outcome_room(condition, 1), None, steps, script)
@@ -66,8 +59,8 @@ def _call_loops(
     return loops(
         condition.model(),
         Assistance(
-            condition.values, condition.others, seen, condition.discount, assistant.numbers,
-            (0,) * task.actions,
+            read_only(condition.values), read_only(condition.others), seen, condition.discount,
+            assistant.numbers, (0,) * task.actions,
         ),
         LearnerStack(*compiled_learner(condition)),
         streams(condition, trials, seed),

@@ -1,11 +1,13 @@
 """Simulated learners at any task: `simulate`, and its parts for prepared conditions."""
 
 import itertools
-from typing import Any, Unpack
+from contextlib import AbstractContextManager
+from typing import Protocol, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
+from qbumpers.compilation import compiling_together
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.simulation import deep, tabular
@@ -34,7 +36,7 @@ def simulate(
         task: what is to be learned.
         assistant: an assistant, or the name of one that needs no options.
         trials: how many, at least 1; or which.
-        seed: of the experiment, not negative.
+        seed: decides, with the condition and the number of a trial, all chance; not negative.
         workers: threads, or processes if a task steps in Python; a script that asks for several of
             those must guard its start with `if __name__ == "__main__"`.
         **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
@@ -71,11 +73,58 @@ def run(
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
-    return engine_of(condition.task).run_block(condition, trials, seed)
+    with _compiling(condition):
+        return engine_of(condition.task).run_block(condition, trials, seed)
 
 
-def engine_of(task: Task) -> Any:
-    """The module that simulates a task, with its `REVISION` and `PRECISION`."""
+def _compiling(condition: Condition) -> AbstractContextManager[None]:
+    what = f"assistant {condition.assistant.name}, learner {condition.learner_type.name}"
+    return compiling_together(what)
+
+
+class Engine(Protocol):
+    """What simulates trials of one kind of task: `qbumpers.simulation.tabular` or `deep`.
+
+    Attributes:
+        REVISION: raised when the numbers that it gives change.
+        PRECISION: of those numbers.
+    """
+
+    REVISION: int
+    PRECISION: str
+
+    def run_block(self, condition: Condition, trials: range, seed: int) -> Simulation:
+        """Simulate trials of a condition, one after another on one core.
+
+        Args:
+            condition: what to simulate.
+            trials: which trials.
+            seed: the experiment's, for the random streams.
+        """
+        ...
+
+    def record(
+        self,
+        condition: Condition,
+        trials: range,
+        seed: int,
+        script: Script | None,
+        interpreted: bool = False,
+    ) -> Step:
+        """Every step of training of one trial; `qbumpers.simulation.record` says more.
+
+        Args:
+            condition: what to simulate.
+            trials: a range of one trial.
+            seed: the experiment's, for the random streams.
+            script: proposals and noise to be played again; None to draw them.
+            interpreted: whether to run compiled code as plain Python, to be compared with.
+        """
+        ...
+
+
+def engine_of(task: Task) -> Engine:
+    """The engine for a task: by whether its states are numbered or observed as vectors."""
     return tabular if task.states else deep
 
 
@@ -97,7 +146,7 @@ def record(
     Args:
         condition: what to simulate.
         trial: which trial.
-        seed: of the experiment.
+        seed: as for `simulate`.
         script: proposals and noise to be played again, in place of a learner's and fresh noise;
             the trial ends with the script.
 
@@ -110,7 +159,8 @@ def record(
     if script is not None:
         _check_script(script, condition.task.actions)
     trials = _checked_trials(range(trial, trial + 1), seed)
-    return engine_of(condition.task).record(condition, trials, seed, script)
+    with _compiling(condition):
+        return engine_of(condition.task).record(condition, trials, seed, script)
 
 
 def _checked_trials(trials: int | range, seed: int) -> range:

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -17,6 +18,7 @@ from concurrent.futures import (
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
+from qbumpers.kept_code import KeptCodeWarning
 from qbumpers.tasks import Task
 
 Found = TypeVar("Found")
@@ -36,12 +38,12 @@ def make_pool(task: Task, workers: int) -> Iterator[Executor]:
     the interpreter, so it takes processes. They end with this process, however it ends.
 
     Args:
-        task: that is simulated.
+        task: what is simulated.
         workers: how many threads or processes.
 
     Yields:
-        The pool, to be used with `submit` and `some_finished`. Where the block is left before all
-        is done, nobody waits for the rest: processes are ended, threads go on unheeded.
+        The pool, to be used with `submit` and `some_finished`. If the block is left before all
+        is done, nothing waits for the rest: processes are ended, threads go on unheeded.
     """
     if task.releases_gil:
         pool: Executor = ThreadPoolExecutor(workers)
@@ -94,7 +96,8 @@ def _interrupts_later() -> Iterator[None]:
 
 
 def _follow_parent() -> None:
-    """Leave Ctrl-C to the parent process, and end when it ends, even where it is killed."""
+    """Leave Ctrl-C to the parent process, and end when it ends, even if it is killed."""
+    warnings.simplefilter("ignore", KeptCodeWarning)  # the parent has said it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_after_parent, daemon=True).start()
 

@@ -8,15 +8,15 @@ import numpy as np
 from qbumpers.errors import RequestError
 from qbumpers.tasks.task import Task
 
-_ROW_TOLERANCE = 1e-8
+_EXACT, _NEAR = 1e-8, 1e-6  # how far from 1 sums of float64 and of float32 numbers come
 
 
 def check_common(task: Task, make_display: Callable[[Any], Any] | None) -> None:
     """Check what tables and vector tasks have in common.
 
     Args:
-        task: the task.
-        make_display: of the task.
+        task: what is checked.
+        make_display: what the task was given to make its display; None if nothing.
 
     Raises:
         RequestError: if a number is out of range, distances have another shape than [A, A], are not
@@ -46,25 +46,33 @@ def check_common(task: Task, make_display: Callable[[Any], Any] | None) -> None:
         )
 
 
-def check_rows(name: str, probability: np.ndarray) -> None:
-    """Check distributions.
+def normalised_rows(name: str, probability: np.ndarray) -> np.ndarray:
+    """Distributions, checked.
 
     Args:
-        name: of the array, for messages.
+        name: what messages call the array.
         probability: float [..., K].
+
+    Returns:
+        The same array; if it holds numbers that were rounded to float32, a float64 one whose rows
+        sum to 1.
 
     Raises:
         RequestError: if a number is no probability, or those along the last axis do not sum to 1.
     """
     if not np.isfinite(probability).all() or (probability < 0).any():
         raise RequestError(f"{name} holds a number that is no probability (negative or not finite)")
-    sums = probability.sum(axis=-1)
-    wrong = np.argwhere(np.abs(sums - 1) > _ROW_TOLERANCE)
+    sums = probability.sum(axis=-1, dtype=np.float64)
+    errors = np.abs(sums - 1)
+    wrong = np.argwhere(errors > _NEAR)
     if len(wrong):
         where = ", ".join(str(i) for i in wrong[0])
         labels = "state, action" if sums.ndim == 2 else "distribution"
         place = f" for ({labels}) = ({where})" if sums.ndim else ""
-        raise RequestError(f"{name}{place} sums to {sums[tuple(wrong[0])]:g}; it must sum to 1")
+        raise RequestError(f"{name}{place} sums to {sums[tuple(wrong[0])]!s}; it must sum to 1")
+    if (errors > _EXACT).any():
+        return probability / sums[..., None]
+    return probability
 
 
 def check_arrays(task: Any) -> None:
@@ -80,12 +88,18 @@ def check_arrays(task: Any) -> None:
         raise RequestError(
             f"{place}: start has shape {np.shape(task.start)}; {shape[:1]} is needed"
         )
-    check_rows(f"{place}: probability", task.probability)
-    check_rows(f"{place}: start", task.start)
     if not np.isfinite(task.reward).all():
         raise RequestError(f"{place}: reward holds a number that is not finite")
+    if task.next_state.dtype.kind not in "iu":
+        raise RequestError(
+            f"{place}: next_state holds {task.next_state.dtype}; whole numbers are needed"
+        )
     if task.next_state.min() < 0 or task.next_state.max() >= shape[0]:
         raise RequestError(f"{place}: next_state must lie in [0, {shape[0]})")
+    for field in ("terminated", "success", "crash"):
+        array = getattr(task, field)
+        if array is not None and not np.isin(array, (0, 1)).all():
+            raise RequestError(f"{place}: {field} must hold nothing but true and false")
 
 
 def check_cells(task: Any) -> None:

@@ -1,12 +1,15 @@
 """Tabular tasks from the forms in which they are usually written down."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.checking import check_rows
+from qbumpers.tasks.checking import normalised_rows
+from qbumpers.tasks.wrapping import followed_reward, step_limit
 
 Judge = Callable[[int, int, int, float, bool], bool]
 """`(state, action, next_state, reward, terminated) -> bool`."""
@@ -16,17 +19,17 @@ Table = Mapping[int, Mapping[int, list[tuple[float, int, float, bool]]]]
 
 
 def outcomes_of_arrays(
-    transition: np.ndarray,
-    reward: np.ndarray,
-    terminal: np.ndarray,
-    success: np.ndarray | None,
-    crash: np.ndarray | None,
+    transition: ArrayLike,
+    reward: ArrayLike,
+    terminal: ArrayLike,
+    success: ArrayLike | None,
+    crash: ArrayLike | None,
 ) -> dict[str, np.ndarray | None]:
     """The outcomes [S, A, K] of each action; see `TabularTask.from_arrays`."""
     transition = np.asarray(transition, np.float64)
     if transition.ndim != 3 or transition.shape[0] != transition.shape[2]:
         raise RequestError(f"transition has shape {transition.shape}; [S, A, S] is needed")
-    check_rows("transition", transition)
+    transition = normalised_rows("transition", transition)
     states, actions, _ = transition.shape
     outcomes = max(1, int((transition > 0).sum(axis=2).max()))
     # Possible outcomes first: the others' probability is 0 and they are never drawn.
@@ -49,7 +52,7 @@ def outcomes_of_arrays(
     }
 
 
-def start_distribution(start: np.ndarray | int, states: int) -> np.ndarray:
+def start_distribution(start: ArrayLike, states: int) -> np.ndarray:
     """Distribution of the first state, float64 [S], if it may be given as one state."""
     if np.ndim(start):
         return np.asarray(start, np.float64)
@@ -75,6 +78,10 @@ def outcomes_of_table(
         for k, row in enumerate(table[s][a]):
             place = s, a, k
             probability[place], next_state[place], reward[place], terminated[place] = row
+            if next_state[place] != row[1]:
+                raise RequestError(
+                    f"table[{s}][{a}]: next state = {row[1]!r}; a whole number is needed"
+                )
     if success is None and crash is None:
         events = _endings(terminated, reward, probability)
     else:
@@ -114,8 +121,33 @@ def _endings(
     )
 
 
-def description_of(environment: Any, episode_limit: int | None) -> dict[str, Any]:
-    """What `TabularTask.from_table` takes, of a Gymnasium environment with a transition table."""
+class Description(NamedTuple):
+    """What is known of a Gymnasium environment with a transition table.
+
+    Attributes:
+        table: arguments of `TabularTask.from_table`, states and actions counted from 0.
+        first_state: number that the environment gives to state 0.
+        first_action: number that the environment gives to action 0.
+        reward: what its wrappers make of a reward.
+    """
+
+    table: dict[str, Any]
+    first_state: int
+    first_action: int
+    reward: Callable[[float], float]
+
+
+def description_of(environment: Any, episode_limit: int | None) -> Description:
+    """What a task needs of a Gymnasium environment with a transition table.
+
+    Args:
+        environment: with any wrappers.
+        episode_limit: steps; the environment's own limit if None.
+
+    Raises:
+        RequestError: if it has no table or no limit is known, a wrapper cannot be followed, or its
+            spaces are not the table's.
+    """
     inner = environment.unwrapped
     name = environment.spec.id if environment.spec else type(inner).__name__
     table = getattr(inner, "P", None)
@@ -126,19 +158,56 @@ def description_of(environment: Any, episode_limit: int | None) -> dict[str, Any
             f"environment {name} has no attribute {missing}: a tabular task needs its "
             "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
         )
-    if episode_limit is None and environment.spec:
-        episode_limit = environment.spec.max_episode_steps
+    reward = followed_reward(environment, name)
+    first_state, first_action = _starts(environment, name, table)
+    if episode_limit is None:
+        episode_limit = step_limit(environment)
     if episode_limit is None:
         raise RequestError(f"environment {name} has no step limit: give episode_limit")
     grid = np.shape(inner.desc) if np.ndim(getattr(inner, "desc", 0)) == 2 else None
     if grid is not None and int(np.prod(grid)) != len(table):
         grid = None
+    followed = _followed(table, first_state, first_action, reward)
+    return Description(
+        {"table": followed, "start": start, "name": name, "episode_limit": episode_limit,
+         "grid": grid},
+        first_state, first_action, reward,
+    )  # fmt: skip
+
+
+def _starts(environment: Any, name: str, table: Table) -> tuple[int, int]:
+    """The first numbers of states and actions; RequestError if the spaces are not the table's."""
+    rows = table[min(table)] if table else {}
+    shown = (("observation", "states", len(table)), ("action", "actions", len(rows)))
+    starts = []
+    for kind, counted, size in shown:
+        space = getattr(environment, f"{kind}_space")
+        if not isinstance(space, spaces.Discrete) or int(space.n) != size:
+            raise RequestError(
+                f"environment {name}: its {kind} space is {space}; its table has {size} {counted}, "
+                f"so Discrete({size}) is needed"
+            )
+        starts.append(int(space.start))
+    return starts[0], starts[1]
+
+
+def _followed(
+    table: Table, first_state: int, first_action: int, reward: Callable[[float], float]
+) -> Table:
+    """A table with the rewards that wrappers make of its own, its numbers counted from 0."""
+    # It may count as the spaces do, or from 0 all the same.
+    state = first_state if first_state == min(table) else 0
+    action = first_action if first_action == min(table[min(table)]) else 0
     return {
-        "table": table, "start": start, "name": name, "episode_limit": episode_limit, "grid": grid,
-    }  # fmt: skip
+        s - state: {
+            a - action: [(p, to - state, reward(float(paid)), end) for p, to, paid, end in rows]
+            for a, rows in actions.items()
+        }
+        for s, actions in table.items()
+    }
 
 
-def _state_flags(name: str, flags: np.ndarray, states: int) -> np.ndarray:
+def _state_flags(name: str, flags: ArrayLike, states: int) -> np.ndarray:
     array = np.asarray(flags, np.bool_)
     if array.shape != (states,):
         raise RequestError(

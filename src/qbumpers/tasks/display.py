@@ -32,7 +32,7 @@ class Shape(TypedDict):
         points: [[x, y], ...]: corners; ends; one centre of a circle or of a text.
         colour: "#rrggbb", of the inside; of a line or a text, its own.
         outline: "#rrggbb", of the border of a polygon or circle; absent if there is none.
-        width: of the border or line, centred on the edge.
+        width: how wide the border or line is, centred on the edge.
         text: what is written.
         size: radius of a circle; font size of a text.
     """
@@ -54,8 +54,8 @@ class Display(NamedTuple):
     """How a task is shown and played; made from the task's arguments, never part of its digest.
 
     Attributes:
-        width: of the coordinate system of every shape.
-        height: of the same.
+        width: largest x of the coordinates of shapes, in pixels at the display's own size.
+        height: largest y, likewise.
         actions: a name for each action.
         keys: from a key (`KeyboardEvent.code`) to its action.
         rate: steps per second; 0 if every step waits for a key.
@@ -122,7 +122,7 @@ def unassisted_step(
     Args:
         state: where the step began; number or float32 [D].
         action: proposed and executed.
-        reward: of the environment.
+        reward: what the environment gave.
         next_state: where the action led.
         events: bits of `qbumpers.tasks.dynamics`.
     """

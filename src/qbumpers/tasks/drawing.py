@@ -1,6 +1,7 @@
 """Pictures of tasks: the shapes of a display drawn by Pillow."""
 
 import functools
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,53 @@ from qbumpers.tasks.display import Display, Shape
 _SMOOTH = 4  # drawn this many times larger, then reduced: Pillow's edges are jagged
 
 
+class Painter:
+    """Draws pictures of one display at one height; its backdrop is drawn once and copied.
+
+    Args:
+        display: how the task is shown.
+        height: of the pictures, in pixels; the display's own if None.
+    """
+
+    def __init__(self, display: Display, height: int | None = None) -> None:
+        from PIL import Image
+
+        height = round(display.height) if height is None else height
+        scale = height / display.height
+        size = round(display.width * scale) * _SMOOTH, height * _SMOOTH
+        self._scale, self._scene = scale * _SMOOTH, display.scene
+        self._backdrop = Image.new("RGB", size)
+        self._draw(self._backdrop, display.backdrop)
+
+    def picture(self, state: Any, step: Step | None = None) -> np.ndarray:
+        """What a state looks like.
+
+        Args:
+            state: number of the state, or the observation, float32 [D].
+            step: the last one, for what it leaves to be seen (flames, rewards); None at the start.
+
+        Returns:
+            uint8 [height, W, 3], with W in the proportion of the display.
+        """
+        drawn = self._backdrop.copy()
+        self._draw(drawn, self._scene(state, step))
+        return np.asarray(drawn.reduce(_SMOOTH))
+
+    def _draw(self, image: Any, shapes: Iterable[Shape]) -> None:
+        from PIL import ImageDraw
+
+        draw = ImageDraw.Draw(image)
+        for shape in shapes:
+            _DRAW[shape["kind"]](draw, shape, self._scale)
+
+
 def picture(
     display: Display, state: Any, step: Step | None = None, height: int | None = None
 ) -> np.ndarray:
-    """What a state looks like.
+    """What a state looks like: one picture; a `Painter` draws many of them faster.
 
     Args:
-        display: of the task.
+        display: how the task is shown.
         state: number of the state, or the observation, float32 [D].
         step: the last one, for what it leaves to be seen (flames, rewards); None at the start.
         height: of the picture, in pixels; the display's own if None.
@@ -25,16 +66,7 @@ def picture(
     Returns:
         uint8 [height, W, 3], with W in the proportion of the display.
     """
-    from PIL import Image, ImageDraw
-
-    height = round(display.height) if height is None else height
-    scale = height / display.height
-    size = round(display.width * scale) * _SMOOTH, height * _SMOOTH
-    drawn = Image.new("RGB", size)
-    draw = ImageDraw.Draw(drawn)
-    for shape in (*display.backdrop, *display.scene(state, step)):
-        _DRAW[shape["kind"]](draw, shape, scale * _SMOOTH)
-    return np.asarray(drawn.reduce(_SMOOTH))
+    return Painter(display, height).picture(state, step)
 
 
 def _polygon(draw: Any, shape: Shape, scale: float) -> None:

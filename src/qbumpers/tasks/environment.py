@@ -1,5 +1,6 @@
 """Any tabular task as a Gymnasium environment."""
 
+import functools
 from typing import Any
 
 import gymnasium
@@ -8,7 +9,7 @@ from gymnasium import spaces
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.tasks.display import unassisted_step
-from qbumpers.tasks.drawing import picture
+from qbumpers.tasks.drawing import Painter
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, first_state, transition
 from qbumpers.tasks.task import Task
 
@@ -74,7 +75,11 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         """For "rgb_array" the picture of the state, uint8 [H, W, 3]; None without a mode."""
         if self.render_mode != "rgb_array":
             return None
-        return picture(self.task.display, self._state, self._last_step)
+        return self._painter.picture(self._state, self._last_step)
+
+    @functools.cached_property
+    def _painter(self) -> Painter:
+        return Painter(self.task.display)
 
     def snapshot(self) -> int:
         """The number of the state."""

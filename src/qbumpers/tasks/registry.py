@@ -75,8 +75,8 @@ def make_task(
             f"task {name!r}: discount is missing; Gymnasium states none, give one in (0, 1]"
         )
     with closing(make_environment(name, **arguments)) as environment:
-        discrete = isinstance(environment.observation_space, spaces.Discrete)
-        if discrete or hasattr(environment.unwrapped, "P"):
+        # A wrapper may show a numbered state as a vector.
+        if isinstance(environment.observation_space, spaces.Discrete):
             return TabularTask.from_gymnasium(
                 environment, discount=discount, episode_limit=episode_limit
             )

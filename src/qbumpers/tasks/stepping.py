@@ -11,7 +11,8 @@ import numpy as np
 from qbumpers.errors import RequestError
 from qbumpers.source import version_of
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
-from qbumpers.tasks.undoing import layers_of, undo_of
+from qbumpers.tasks.undoing import undo_of
+from qbumpers.tasks.wrapping import layers
 
 REVISION = 1
 """Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
@@ -57,7 +58,7 @@ class UndoableStepper(Stepper, Protocol):
         """Put the state of a snapshot back.
 
         Args:
-            snapshot: of this episode.
+            snapshot: from `snapshot`, in this episode.
         """
         ...
 
@@ -69,7 +70,7 @@ class GymnasiumStepper:
 
     Args:
         name: id of the environment.
-        arguments: of the environment.
+        arguments: what the environment takes besides, by name.
     """
 
     def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
@@ -109,22 +110,22 @@ def stepped_by_of(environment: Any) -> tuple[Any, ...]:
         Its class and those of its wrappers, what they were made with and, if it is an installed
         one, the libraries that its modules import: one that steps it may be among them.
     """
-    layers = [type(layer) for layer in layers_of(environment)]
+    kinds = [type(layer) for layer in layers(environment)]
     spec = environment.spec
     given = [] if spec is None else [spec.kwargs, [w.kwargs for w in spec.additional_wrappers]]
     makes = [] if spec is None or isinstance(spec.entry_point, str) else [spec.entry_point]
-    installed = [k.__module__ for k in layers[-1].__mro__ if version_of(k.__module__)]
+    installed = [k.__module__ for k in kinds[-1].__mro__ if version_of(k.__module__)]
     there = [each for name in installed for each in vars(sys.modules[name]).values()]
     libraries = [e for e in there if isinstance(e, ModuleType) and version_of(e.__name__)]
-    return (*layers, *makes, *given, *dict.fromkeys(libraries))
+    return (*kinds, *makes, *given, *dict.fromkeys(libraries))
 
 
 def make_environment(name: str, **arguments: Any) -> Any:
     """A Gymnasium environment.
 
     Args:
-        name: its id.
-        **arguments: of `gymnasium.make`.
+        name: id of the environment, for example "CartPole-v1".
+        **arguments: what `gymnasium.make` takes besides.
 
     Returns:
         The environment.

@@ -9,8 +9,11 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import TimeLimit
+from numpy.typing import ArrayLike
 
-from qbumpers.tasks.checking import check_arrays, check_cells, check_common
+from qbumpers.errors import RequestError
+from qbumpers.tasks.agreement import check_agreement
+from qbumpers.tasks.checking import check_arrays, check_cells, check_common, normalised_rows
 from qbumpers.tasks.construction import (
     Judge,
     Table,
@@ -24,6 +27,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.task import distance_between
 
 
@@ -31,8 +35,8 @@ from qbumpers.tasks.task import distance_between
 class TabularTask:
     """A finite episodic Markov decision process (Section 2.1); it is a `Task`.
 
-    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0. The
-    last four fields are optional; `dataclasses.replace` adds them to a task from any source.
+    S states, A actions, at most K outcomes of an action; unused outcomes have probability 0.
+    Fields from `success` on are optional; `dataclasses.replace` adds them to any task.
 
     Attributes:
         name: for messages and files.
@@ -50,6 +54,8 @@ class TabularTask:
         no_op: the action that does nothing; -1 if there is none.
         action_distance: float [A, A], how far apart actions are; None if any two are alike.
         seen: int [S], number of what the assistant sees of each state, if it is less than all.
+        first_state: number that its environment gives to state 0; it counts on from there.
+        first_action: number that its environment gives to action 0.
         make_display: makes `display` of the task; no part of its digest.
 
     Raises:
@@ -71,6 +77,8 @@ class TabularTask:
     no_op: int = -1
     action_distance: np.ndarray | None = None
     seen: np.ndarray | None = None
+    first_state: int = 0
+    first_action: int = 0
     make_display: Callable[["TabularTask"], Any] | None = None
 
     observation_size = 0
@@ -84,6 +92,9 @@ class TabularTask:
     def __post_init__(self) -> None:
         """Check every field."""
         check_arrays(self)
+        for field in ("probability", "start"):
+            rows = normalised_rows(f"task {self.name}: {field}", getattr(self, field))
+            object.__setattr__(self, field, rows)
         check_common(self, self.make_display)
         check_cells(self)
 
@@ -99,8 +110,13 @@ class TabularTask:
 
     @property
     def observation_space(self) -> spaces.Discrete:
-        """The numbers of its states."""
-        return spaces.Discrete(self.states)
+        """The numbers of its states, as its environment counts them."""
+        return spaces.Discrete(self.states, start=self.first_state)
+
+    @property
+    def action_space(self) -> spaces.Discrete:
+        """The numbers of its actions, as its environment counts them."""
+        return spaces.Discrete(self.actions, start=self.first_action)
 
     @property
     def events(self) -> frozenset[str]:
@@ -143,6 +159,16 @@ class TabularTask:
             episode_limit=int(self.episode_limit),
         )
 
+    def make_stepper(self) -> Stepper:
+        """Refused: its states are numbered.
+
+        Raises:
+            RequestError: always.
+        """
+        raise RequestError(
+            f"task {self.name}: its states are numbered; observations that are vectors are needed"
+        )
+
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
@@ -177,16 +203,16 @@ class TabularTask:
     @classmethod
     def from_arrays(
         cls,
-        transition: np.ndarray,
-        reward: np.ndarray,
-        terminal: np.ndarray,
-        start: np.ndarray | int,
+        transition: ArrayLike,
+        reward: ArrayLike,
+        terminal: ArrayLike,
+        start: ArrayLike,
         *,
         discount: float,
         episode_limit: int,
         name: str = "task",
-        success: np.ndarray | None = None,
-        crash: np.ndarray | None = None,
+        success: ArrayLike | None = None,
+        crash: ArrayLike | None = None,
         grid: tuple[int, int] | None = None,
     ) -> "TabularTask":
         """A task from the arrays that textbooks use.
@@ -219,7 +245,7 @@ class TabularTask:
     def from_table(
         cls,
         table: Table,
-        start: np.ndarray,
+        start: ArrayLike,
         *,
         discount: float,
         episode_limit: int,
@@ -265,6 +291,11 @@ class TabularTask:
     ) -> "TabularTask":
         """A task from a Gymnasium environment that has a transition table `P`.
 
+        Wrappers that only watch, and TransformReward and ClipReward, are followed. Then the table
+        is compared with steps of the environment, of a copy of it if it can be copied; see
+        `check_agreement`. States and actions are counted from 0 in the task, whatever number the
+        environment's spaces start with.
+
         Args:
             environment: for example `gymnasium.make("FrozenLake-v1")`.
             discount: in (0, 1]; Gymnasium's environments state none.
@@ -276,11 +307,17 @@ class TabularTask:
             The task.
 
         Raises:
-            RequestError: if the environment has no table, or no limit is known.
+            RequestError: if the environment has no table, no limit is known, it has a wrapper that
+                cannot be followed, or its spaces or steps are not those of the table.
         """
-        description = description_of(environment, episode_limit)
-        made = cls.from_table(**description, discount=discount, success=success, crash=crash)
-        return replace(made, make_display=display_maker(environment))
+        found = description_of(environment, episode_limit)
+        made = cls.from_table(**found.table, discount=discount, success=success, crash=crash)
+        numbered = replace(
+            made, first_state=found.first_state, first_action=found.first_action,
+            make_display=display_maker(environment),
+        )  # fmt: skip
+        check_agreement(numbered, environment.unwrapped, found.reward)
+        return numbered
 
 
 def _cumulative(probability: np.ndarray) -> np.ndarray:

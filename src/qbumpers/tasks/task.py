@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 
 from qbumpers.tasks.dynamics import Dynamics
+from qbumpers.tasks.stepping import Stepper
 
 
 class Task(Protocol):
@@ -46,7 +47,12 @@ class Task(Protocol):
 
     @property
     def observation_space(self) -> gymnasium.Space[Any]:
-        """Discrete(S), or Box of float32 [D]."""
+        """Discrete(S), with the environment's start, or Box of float32 [D]."""
+        ...
+
+    @property
+    def action_space(self) -> gymnasium.spaces.Discrete:
+        """Discrete(A), with the environment's start: elsewhere actions count from 0."""
         ...
 
     @property
@@ -128,6 +134,14 @@ class Task(Protocol):
 
         Raises:
             RequestError: if observations are vectors.
+        """
+        ...
+
+    def make_stepper(self) -> Stepper:
+        """The task as simulators of vector observations step through it.
+
+        Raises:
+            RequestError: if states are numbered.
         """
         ...
 

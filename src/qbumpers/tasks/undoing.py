@@ -1,15 +1,17 @@
 """Taking a step of a Gymnasium environment back, through its wrappers."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 from gymnasium import wrappers
 
 from qbumpers.errors import RequestError
+from qbumpers.tasks.wrapping import layers
 
 # Nothing that they keep decides what later steps give, or it counts the step, which has happened.
-_HARMLESS = (
+# Classes derived from these may keep something of their own, so each is named.
+_HARMLESS = {
     wrappers.PassiveEnvChecker,
     wrappers.OrderEnforcing,
     wrappers.TimeLimit,
@@ -17,9 +19,22 @@ _HARMLESS = (
     wrappers.RecordVideo,
     wrappers.HumanRendering,
     wrappers.TransformObservation,
+    wrappers.AddRenderObservation,
+    wrappers.DiscretizeObservation,
+    wrappers.DtypeObservation,
+    wrappers.FilterObservation,
+    wrappers.FlattenObservation,
+    wrappers.GrayscaleObservation,
+    wrappers.RescaleObservation,
+    wrappers.ReshapeObservation,
+    wrappers.ResizeObservation,
     wrappers.TransformReward,
+    wrappers.ClipReward,
     wrappers.TransformAction,
-)
+    wrappers.ClipAction,
+    wrappers.DiscretizeAction,
+    wrappers.RescaleAction,
+}
 
 Snapshot = Callable[[], Any]
 Restore = Callable[[Any], None]
@@ -41,14 +56,14 @@ def undo_of(environment: gymnasium.Env[Any, Any]) -> tuple[Snapshot, Restore]:
         RequestError: if the environment lacks them, or a wrapper may keep something that would not
             be put back, and does not define both itself.
     """
-    for layer in layers_of(environment):
+    for layer in layers(environment):
         kind = type(layer)
         if hasattr(kind, "snapshot") and hasattr(kind, "restore"):
             undoing: Any = layer
             return undoing.snapshot, undoing.restore
         if not isinstance(layer, gymnasium.Wrapper):
             break
-        if not isinstance(layer, _HARMLESS):
+        if kind not in _HARMLESS:
             raise RequestError(
                 f"wrapper {kind.__name__} may keep something that an undone step would not put "
                 "back: give it methods snapshot and restore, or leave it out"
@@ -80,14 +95,6 @@ def reached_limit(environment: gymnasium.Env[Any, Any]) -> bool:
     # Gymnasium has no public name for either number.
     return any(
         (layer._elapsed_steps or 0) >= layer._max_episode_steps
-        for layer in layers_of(environment)
+        for layer in layers(environment)
         if isinstance(layer, wrappers.TimeLimit)
     )
-
-
-def layers_of(environment: Any) -> Iterator[gymnasium.Env[Any, Any]]:
-    """The environment as it is given, and what it wraps, from the outside in."""
-    while isinstance(environment, gymnasium.Wrapper):
-        yield environment
-        environment = environment.env
-    yield environment

@@ -24,6 +24,9 @@ from qbumpers.tasks.stepping import (
 )
 from qbumpers.tasks.task import distance_between
 from qbumpers.tasks.undoing import can_undo
+from qbumpers.tasks.wrapping import altering_wrappers, step_limit
+
+_STEPS_REPEATED = 50  # of episodes that are played twice
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,7 @@ class VectorTask:
         action_distance: float [A, A], how far apart actions are; None if any two are alike.
         implied: `no_op` and `action_distance` that follow from the name and the settings; any
             others are part of the digest.
+        first_action: number that the environment gives to action 0.
         make_display: makes `display` of the task; no part of its digest.
         stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
             classes and functions; and modules, for the versions of their libraries.
@@ -74,6 +78,7 @@ class VectorTask:
     no_op: int = -1
     action_distance: np.ndarray | None = None
     implied: tuple[int, np.ndarray | None] = (-1, None)
+    first_action: int = 0
     make_display: Callable[["VectorTask"], Any] | None = None
     stepped_by: tuple[Any, ...] = ()
     revision: int = 1
@@ -114,6 +119,11 @@ class VectorTask:
     def observation_space(self) -> spaces.Box:
         """Every vector of D numbers."""
         return spaces.Box(-np.inf, np.inf, (self.observation_size,), np.float32)
+
+    @property
+    def action_space(self) -> spaces.Discrete:
+        """The numbers of its actions, as its environment counts them."""
+        return spaces.Discrete(self.actions, start=self.first_action)
 
     @property
     def events(self) -> frozenset[str]:
@@ -171,9 +181,10 @@ class VectorTask:
     ) -> "VectorTask":
         """A task from a Gymnasium environment with numbered actions and a vector observation.
 
-        Every episode is seeded by itself. Successes and crashes are known if `info` has the keys
-        `success` and `crash` at reset or after the first step. Steps can be undone if `undo_of`
-        says so of the environment.
+        Every episode is seeded by itself, and must follow from its seed and its actions alone: two
+        are played twice. Wrappers are part of the environment. Successes and crashes are known if
+        `info` has the keys `success` and `crash` at reset or after the first step. Steps can be
+        undone if `undo_of` says so of the environment.
 
         Args:
             name: id of the environment, for example "CartPole-v1".
@@ -186,15 +197,15 @@ class VectorTask:
 
         Raises:
             RequestError: if there is no such environment or it cannot be made, its actions are
-                not Discrete or its observations not a vector, or no limit is known.
+                not Discrete or its observations not a vector, no limit is known, or an episode
+                depends on those before it.
         """
         with closing(make_environment(name, **arguments)) as environment:
             _check_spaces(name, environment)
+            _check_repeatable(name, environment)
             announced, undoable = _announced(environment), can_undo(environment)
             stepped_by = stepped_by_of(environment)
-            limit = episode_limit
-            if limit is None and environment.spec:
-                limit = environment.spec.max_episode_steps
+            limit = step_limit(environment) if episode_limit is None else episode_limit
         if limit is None:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         return cls(
@@ -211,6 +222,7 @@ class VectorTask:
             has_success="success" in announced,
             has_crash="crash" in announced,
             undoable=undoable,
+            first_action=int(environment.action_space.start),
             make_display=display_maker(environment),
             stepped_by=stepped_by,
             revision=REVISION,
@@ -234,6 +246,32 @@ def _check_spaces(name: str, environment: Any) -> None:
             f"task {name!r}: its observation space is {space}; a vector of "
             "numbers (Box with one dimension) is needed"
         )
+
+
+def _check_repeatable(name: str, environment: Any) -> None:
+    """Play an episode, another one, and both once more; RequestError if one differs."""
+    first = [_beginning(environment, seed) for seed in (0, 1)]
+    again = [_beginning(environment, seed) for seed in (0, 1)]
+    if not all(np.array_equal(*both, equal_nan=True) for both in zip(first, again, strict=True)):
+        around = [type(layer).__name__ for layer in altering_wrappers(environment)]
+        blamed = f"; is it wrapper {' or '.join(around)}?" if around else ""
+        raise RequestError(
+            f"task {name!r}: an episode went another way when it was played again with the same "
+            f"seed and actions, so its numbers would hang on what was played before{blamed}"
+        )
+
+
+def _beginning(environment: Any, seed: int) -> np.ndarray:
+    """The first steps of an episode, a row of observation, reward and end each."""
+    observation, _ = environment.reset(seed=seed)
+    rows = [[*observation, 0.0, 0.0]]
+    space = environment.action_space
+    for action in np.random.default_rng(seed).integers(int(space.n), size=_STEPS_REPEATED):
+        observation, reward, terminated, truncated, _ = environment.step(int(space.start + action))
+        rows.append([*observation, float(reward), float(terminated)])
+        if terminated or truncated:
+            break
+    return np.array(rows)
 
 
 def _announced(environment: Any) -> set[str]:

@@ -19,7 +19,7 @@ import io
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import polars as pl
 import tomli_w
@@ -44,13 +44,13 @@ class Contender(NamedTuple):
     """What became of a condition.
 
     Attributes:
-        condition: its id.
-        assistant: the assistant.
-        trials: spent on it.
+        condition: its readable id.
+        assistant: rule and options.
+        trials: how many were spent on it.
         assisted: return with the assistant, in reward units.
         unassisted: the same without it. Both are of fresh trials alone if the
             condition was measured anew (chosen, or not confirmed), else of those of the race.
-        confidence: of these intervals.
+        confidence: that these two intervals have, in (0, 1).
         verdict: for example "teaches worse".
     """
 
@@ -68,9 +68,9 @@ class Tuning(NamedTuple):
 
     Attributes:
         floor: the assisted return that is needed, in reward units.
-        confidence: that the choice is above it.
+        confidence: with which the choice is above the floor, in (0, 1).
         contenders: all conditions, in the order of the experiment.
-        grid_trials: that the whole experiment has.
+        grid_trials: how many trials the whole experiment has.
     """
 
     floor: float
@@ -218,7 +218,7 @@ def _table(tuning: Tuning) -> bytes:
 
 
 def _described(plan: Plan, tuning: Tuning) -> str:
-    facts = {
+    facts: dict[str, Any] = {
         "experiment": plan.experiment.name,
         "floor": tuning.floor,
         "confidence": tuning.confidence,

@@ -3,10 +3,8 @@
 import contextlib
 import math
 import warnings
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Generator, Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from qbumpers.analysis.statistics import mean_interval
 from qbumpers.errors import RequestError
@@ -69,7 +67,7 @@ class Race:
         return max(kept, key=self._teaching, default=None)
 
     def _teaching(self, content: str) -> float:
-        return float(np.mean(self._trials.of_race(content, self._looked[content])[1]))
+        return float(self._trials.of_race(content, self._looked[content])[1].mean())
 
     def _look(self, contents: Collection[str], trials: int) -> None:
         """Look at more trials of conditions, and drop those that are below the floor."""
@@ -107,7 +105,7 @@ def looks(trials: int) -> list[int]:
     """After how many trials the conditions of a race are compared.
 
     Args:
-        trials: of the experiment.
+        trials: how many trials per condition the experiment has.
 
     Returns:
         A twentieth of the trials (at least `FIRST_LOOK`), then twice as many each time, to all.
@@ -126,7 +124,7 @@ def _study() -> "Study":
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> Generator[None, None, None]:
     """Optuna without its log, and without the warning that its pruner may change one day."""
     try:
         import optuna

@@ -19,7 +19,7 @@ class TuningProgress(NamedTuple):
     Attributes:
         trials: looked at, those of an earlier run included.
         of: trials of the whole experiment, of which most will not be needed.
-        steps: that learners took in this run.
+        steps: how many steps learners took in this run.
         damaged: files of an earlier run that were damaged; their trials are run again.
         changed: why finished trials of an earlier run are simulated again, a sentence each.
     """
@@ -39,12 +39,12 @@ class Trials:
 
     Args:
         plan: the experiment, made ready.
-        store: of the results.
+        store: where trials are kept, and found if they were run before.
         backend: where to run.
         report: called with the progress at first and after each cell.
 
     Attributes:
-        contents: of the conditions, in the order of the experiment.
+        contents: digests of the conditions, in the order of the experiment.
         length: N.
         raced: how many trials of a content were looked at in races.
         fresh: how many were looked at for measuring it anew.
@@ -140,7 +140,8 @@ def gaps(span: Cell, finished: Iterable[Cell], size: int) -> list[Cell]:
     Returns:
         Cells in the order of their trials, which neither overlap each other nor finished ones.
     """
-    finished, missing, place = list(finished), [], span.first
+    missing: list[Cell] = []
+    finished, place = list(finished), span.first
     while place < span.end:
         here = [cell.end for cell in finished if cell.first <= place < cell.end]
         if here:

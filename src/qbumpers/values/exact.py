@@ -1,5 +1,8 @@
 """Exact Q* of a tabular task by dynamic programming."""
 
+# SciPy has no types.
+# pyright: basic
+
 from dataclasses import replace
 from typing import cast
 
@@ -58,7 +61,7 @@ def backup(task: TabularTask, state_values: np.ndarray, discount: float) -> np.n
     """Bellman backup: Q(s, a) = sum_k p_k (r_k + discount (1 - terminated_k) V(s'_k)).
 
     Args:
-        task: the task.
+        task: whose transitions and rewards are used.
         state_values: V, float64 [S].
         discount: in (0, 1].
 

@@ -25,17 +25,17 @@ from qbumpers.values.others import (
 
 @dataclass(frozen=True, eq=False)
 class NetworkValues:
-    """Q*(s, a) of a task whose observations are vectors, and if it comes from.
+    """Q*(s, a) of a task whose observations are vectors, and where it comes from.
 
     Attributes:
         network: shape of the network.
         inputs: D, numbers of an observation.
         actions: A.
         parameters: float32 [P], laid out as `qbumpers.networks.network` says, read-only.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
         task: name of the task.
         method: how they were made, in words.
-        version: of the package that made them.
+        version: which version of the package made them.
         others: further values by name, of networks of the same shape, for rules that ask for them.
 
     Raises:
@@ -51,7 +51,7 @@ class NetworkValues:
     task: str
     method: str
     version: str = qbumpers.__version__
-    others: Mapping[str, "NetworkValues"] = field(default_factory=dict)
+    others: Mapping[str, "NetworkValues"] = field(default_factory=dict[str, "NetworkValues"])
 
     def __post_init__(self) -> None:
         """Check everything and freeze the parameters."""
@@ -103,7 +103,7 @@ class NetworkValues:
         """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
 
         Args:
-            path: of the file.
+            path: where the file goes.
 
         Raises:
             StoreError: if it cannot be written.
@@ -157,7 +157,7 @@ def network_values(arrays: dict[str, np.ndarray], provenance: dict[str, Any]) ->
     network = checked(Network, {**settings, "hidden": tuple(settings["hidden"])}, "network")
     inputs = shape.pop("inputs")
     actions = shape.pop("actions")
-    parts = []
+    parts: list[np.ndarray] = []
     for name, needed in named_shapes(network.layout(inputs, actions)).items():
         found = arrays.get(name)
         if found is None or (found.shape, found.dtype) != (needed, np.float32):

@@ -18,7 +18,7 @@ def check_others(values: Any, shape_of: Callable[[Any], Any]) -> None:
     """Check that further values are of the same kind and shape as those that hold them.
 
     Args:
-        values: that hold them.
+        values: what holds them, a `TabularValues` or `NetworkValues`.
         shape_of: what must be equal, of values of this kind.
 
     Raises:
@@ -84,8 +84,8 @@ def further_values(values: Any, name: str, assistant: str) -> Any:
     """Further values beside Q*, by name.
 
     Args:
-        values: of the assistant, of any kind.
-        name: of what its rule asks for.
+        values: the assistant's Q*, of any kind; further ones are in `others`.
+        name: which further values its rule asks for.
         assistant: its name, for the message.
 
     Raises:

@@ -10,12 +10,12 @@ from qbumpers.learners.interface import Table, Transition
 from qbumpers.learners.q_learning import QLearner
 from qbumpers.random_streams import ENVIRONMENT, LEARNER, draw, trial_streams
 from qbumpers.tasks.dynamics import TERMINATED, Dynamics, first_state, transition
-from qbumpers.tasks.tabular import TabularTask
+from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import TabularValues
 
 
 def learn_values(
-    task: TabularTask,
+    task: Task,
     *,
     episodes: int = 10_000,
     seed: int = 0,
@@ -26,14 +26,15 @@ def learn_values(
     Args:
         task: what is to be learned.
         episodes: how many, at least 1.
-        seed: of the random streams, not negative.
+        seed: decides all chance; not negative.
         learner: schedules and discount; if None, the paper's, with the task's discount.
 
     Returns:
         The values of the last episode. Pairs that were never visited keep the initial value.
 
     Raises:
-        RequestError: if `episodes` is below 1 or `seed` is negative.
+        RequestError: if the task has no table of transitions, `episodes` is below 1 or `seed` is
+            negative.
     """
     if episodes < 1:
         raise RequestError(f"episodes = {episodes!r}; at least 1 is needed")

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 from zipfile import BadZipFile
 
 import numpy as np
@@ -49,10 +49,10 @@ class TabularValues:
 
     Attributes:
         table: float64 [S, A], in reward units, read-only.
-        discount: of the values.
+        discount: gamma of the values, in (0, 1].
         task: name of the task.
         method: how they were made, in words.
-        version: of the package that made them.
+        version: which version of the package made them.
         others: further values by name, of the same shape, for rules that ask for them; an array
             [S, A] will do.
 
@@ -66,7 +66,7 @@ class TabularValues:
     task: str
     method: str
     version: str = qbumpers.__version__
-    others: Mapping[str, "TabularValues"] = field(default_factory=dict)
+    others: Mapping[str, "TabularValues"] = field(default_factory=dict[str, "TabularValues"])
 
     def __post_init__(self) -> None:
         """Check the table and freeze it."""
@@ -92,7 +92,9 @@ class TabularValues:
         """Further values; an array is taken for a table of the same origin."""
         if not isinstance(given, np.ndarray):
             return given
-        return TabularValues(given, self.discount, self.task, self.method, self.version)
+        return TabularValues(
+            cast(np.ndarray, given), self.discount, self.task, self.method, self.version
+        )
 
     def __call__(self, observation: Any, /) -> np.ndarray:
         """Q*(s, .) as float64 [A]; the observation is the number of the state."""
@@ -108,7 +110,7 @@ class TabularValues:
         """Write a NumPy `.npz` file, atomically; `load_values` reads it back.
 
         Args:
-            path: of the file.
+            path: where the file goes.
 
         Raises:
             StoreError: if it cannot be written.
@@ -143,7 +145,7 @@ def load_values(path: str | Path) -> TabularValues | NetworkValues:
     """Read values that `TabularValues.save` or `NetworkValues.save` wrote.
 
     Args:
-        path: of the file.
+        path: where the file is.
 
     Returns:
         The values.
@@ -165,7 +167,7 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
     """Values from the bytes of a file that `save` wrote.
 
     Args:
-        content: of the file.
+        content: the bytes of the file.
         path: for messages.
 
     Returns:
@@ -175,21 +177,35 @@ def decoded_values(content: bytes, path: str) -> TabularValues | NetworkValues:
         RequestError: if it is no such file, its arrays do not fit together, or it was changed
             since.
     """
+    version = ""
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             arrays = dict(archive.items())
-        provenance = json.loads(str(arrays.pop("provenance")))
+        provenance = json.loads(str(arrays.pop("provenance", "{}")))
+        version = str(provenance.get("version", ""))
         expected = provenance.pop("sha256")
         values = _with_others(arrays, provenance)
     except RequestError as error:
         raise RequestError(f"values file {path}: {error}") from error
     except _DAMAGE as error:
-        raise RequestError(f"values file {path}: not a file of Q values ({error})") from error
+        raise RequestError(f"values file {path}: {_reason(content, version, error)}") from error
     if values.digest() != expected:
         raise RequestError(
             f"values file {path}: its contents do not match its hash; it was changed"
         )
     return values
+
+
+def _reason(content: bytes, version: str, error: Exception) -> str:
+    """Why a file cannot be read."""
+    if version not in ("", qbumpers.__version__):
+        return f"written by qbumpers {version}, and this is {qbumpers.__version__} ({error})"
+    if b"_stable_baselines3_version" in content:
+        return (
+            "a model of Stable-Baselines3; convert it by qbumpers.experts.from_stable_baselines "
+            "and save the values"
+        )
+    return f"not a file of Q values ({error})"
 
 
 def _with_others(
@@ -230,7 +246,8 @@ def check_width(values: Any, actions: int, where: str) -> np.ndarray:
     row = np.array(values, np.float64)
     if row.shape != (actions,):
         raise RequestError(
-            f"Q values {where} have shape {row.shape}; one value an action, ({actions},), is needed"
+            f"Q values {where} have shape {row.shape}; one value per action, ({actions},), is "
+            "needed"
         )
     # The sum is finite only if every value is; it is ten times as fast to look at.
     if not math.isfinite(sum(row.tolist())) and not np.isfinite(row).all():

@@ -15,6 +15,7 @@ from qbumpers.analysis.figures.curves import (
 )
 from qbumpers.analysis.figures.style import looks
 from qbumpers.analysis.measures import learning_curve, override_curve
+from tests.analysis.drawn import xs, ys
 from tests.analysis.examples import BUMPERS, THRESHOLDS, episode_table, summary_table
 
 CHOSEN = ["none", *list(BUMPERS)[:2]]
@@ -47,8 +48,8 @@ def test_every_condition_is_a_line_with_a_band_in_both_panels():
         assert (axes.get_xlabel(), axes.get_ylabel()) == ("episode", "return")
         assert len(axes.lines) == len(axes.collections) == 3
         for line, condition in zip(axes.lines, CHOSEN, strict=True):
-            assert line.get_xdata().tolist() == [1, 2, 3, 4, 5, 6]
-            assert line.get_ydata() == pytest.approx(learning_curve(table, condition, column)[0])
+            assert xs(line).tolist() == [1, 2, 3, 4, 5, 6]
+            assert ys(line) == pytest.approx(learning_curve(table, condition, column)[0])
 
 
 def test_the_legend_names_the_conditions_and_lines_of_one_assistant_differ():
@@ -101,7 +102,7 @@ def test_the_course_of_overrides_is_in_per_cent_of_steps():
         rows = courses.filter(condition=condition)
         assert rows["override_rate_low"].to_numpy() == pytest.approx(low)
         assert rows["override_rate_high"].to_numpy() == pytest.approx(high)
-        assert line.get_ydata() == pytest.approx(100 * mean)
+        assert ys(line) == pytest.approx(100 * mean)
 
 
 @pytest.mark.parametrize(
@@ -165,4 +166,4 @@ def test_rates_are_drawn_in_per_cent_whatever_is_asked_for():
     for axes, expected in zip(drawing.axes, ([0, 0, 0, 100, 100, 100], [0] * 6), strict=True):
         assert axes.get_ylabel() == "episodes that succeed, per cent"
         assert axes.get_ylim() == (-4, 104)
-        assert axes.lines[0].get_ydata().tolist() == expected
+        assert ys(axes.lines[0]).tolist() == expected

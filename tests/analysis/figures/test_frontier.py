@@ -7,6 +7,7 @@ import pytest
 from qbumpers.analysis.figures.frontier import Marks, frontier_figure, overriding
 from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN
 from qbumpers.analysis.figures.style import looks, setting
+from tests.analysis.drawn import point_of, xs, ys
 from tests.analysis.examples import (
     BUMPERS,
     points_of,
@@ -116,14 +117,14 @@ def test_the_staircase_bounds_what_the_conditions_reach_and_stretches_no_panel()
     for axes in drawing.axes:
         [stairs] = [line for line in axes.lines if line.get_linestyle() == ":"]
         assert stairs.get_drawstyle() == "steps-pre"  # to the left of a point, at its height
-        assert stairs.get_xdata().tolist() == best["assisted_mean"].to_list()
-        assert stairs.get_ydata().tolist() == best["unassisted_mean"].to_list()
+        assert xs(stairs).tolist() == best["assisted_mean"].to_list()
+        assert ys(stairs).tolist() == best["unassisted_mean"].to_list()
     assert drawing.axes[0].get_xlim()[0] > 0  # "none" has -300
 
 
 def test_points_outside_the_cluster_are_labelled_with_their_alpha():
     drawing = drawn_from(table_of())
-    notes = {note.get_text(): note.xy for note in drawing.axes[0].texts}
+    notes = {note.get_text(): point_of(note) for note in drawing.axes[0].texts}
     rows = table_of().filter(assistant="stochastic-q-bumpers").iter_rows(named=True)
     assert notes == {
         setting(row["condition"]): (row["assisted_mean"], row["unassisted_mean"]) for row in rows

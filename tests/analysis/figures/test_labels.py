@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from qbumpers.analysis.figures.labels import label_in_column, room_for_labels
 from qbumpers.analysis.figures.style import figure
+from tests.analysis.drawn import segments
 
 SIZE = np.array([6.0, 4.0])
 PLACES = st.lists(st.tuples(st.floats(0, 6), st.floats(0, 4)), min_size=1, max_size=25)
@@ -81,7 +82,7 @@ def test_labels_of_a_cluster_stand_apart_within_the_axes_in_the_order_of_their_p
     assert heights == sorted(heights)
     assert all(0 < height < 1 for height in heights)
     assert count == 1 or min(np.diff(heights)) > 0.05  # a line of text is lower
-    lines = {tuple(start): tuple(end) for start, end in axes.collections[0].get_segments()}
+    lines = {tuple(start): tuple(end) for start, end in segments(axes.collections[0])}
     assert lines == {tuple(points[index]): texts[f"p{index}"] for index in range(count)}
 
 

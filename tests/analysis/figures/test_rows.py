@@ -3,9 +3,11 @@
 import numpy as np
 import polars as pl
 import pytest
+from matplotlib.collections import PathCollection
 
 from qbumpers.analysis.figures.rows import differences_figure, spreads, spreads_figure
 from qbumpers.analysis.figures.style import looks, readable
+from tests.analysis.drawn import xs
 from tests.analysis.examples import BUMPERS
 
 CONDITIONS = ["none", *BUMPERS]
@@ -73,8 +75,8 @@ def test_rows_bear_the_names_of_the_conditions():
 def test_dots_are_single_trials_up_to_a_hundred_of_a_condition(count, shown):
     table = trials(count)
     axes = spreads_figure(spreads(table, CONDITIONS), table, DRAWN).axes[1]
-    [dots] = [c for c in axes.collections if not hasattr(c, "get_segments")]
-    places = dots.get_offsets()
+    [dots] = [c for c in axes.collections if isinstance(c, PathCollection)]
+    places = np.asarray(dots.get_offsets())
     assert len(places) == shown * len(CONDITIONS)
     for index, condition in enumerate(CONDITIONS):
         own = table.filter(condition=condition)["unassisted"].to_list()[:shown]
@@ -105,7 +107,7 @@ def test_differences_have_two_intervals_and_a_line_at_nothing():
         assert markers_of(axes) == [0.0, 10.0, 20.0]
         assert np.array(lines_of(axes, 3)).tolist() == [[-2, 3], [8, 13], [18, 23]]
         assert np.array(lines_of(axes, 1)).tolist() == [[-4, 5], [6, 15], [16, 25]]
-        [nothing] = [line for line in axes.lines if line.get_xdata()[0] == line.get_xdata()[1] == 0]
+        [nothing] = [line for line in axes.lines if xs(line).tolist() == [0, 0]]
         assert nothing.get_marker() == "None"
 
 

@@ -7,6 +7,7 @@ import scipy.stats
 
 from qbumpers.analysis.figures.runs import run_means, runs_figure
 from qbumpers.analysis.figures.style import NAMES, looks
+from tests.analysis.drawn import xs, ys
 
 CONDITIONS = ["none", "stochastic-q-bumpers/alpha=1", "stochastic-q-bumpers/alpha=0.8"]
 RETURNS = ("assisted", "unassisted")
@@ -52,10 +53,10 @@ def test_every_run_is_a_row_in_which_no_marks_share_a_height():
         marks = [line for line in axes.lines if line.get_marker() not in ("", "None")]
         for line, condition in zip(marks, CONDITIONS, strict=True):
             rows = numbers.filter(condition=condition)
-            assert line.get_xdata().tolist() == rows[f"{measure}_mean"].to_list()
+            assert xs(line).tolist() == rows[f"{measure}_mean"].to_list()
             expected = rows["run"].replace_strict({"default": 0, "relu": 1}).to_list()
-            assert np.round(line.get_ydata()).tolist() == expected
-        heights = [height for line in marks for height in line.get_ydata()]
+            assert np.round(ys(line)).tolist() == expected
+        heights = [height for line in marks for height in ys(line)]
         assert len(set(heights)) == len(heights) == numbers.height
         assert marks[1].get_fillstyle() != marks[2].get_fillstyle()
 

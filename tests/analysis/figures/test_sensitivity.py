@@ -5,6 +5,7 @@ import pytest
 
 from qbumpers.analysis.figures.sensitivity import sensitivities, sensitivity_figure
 from qbumpers.analysis.figures.style import looks
+from tests.narrowing import present
 
 OPTIONS = ["alpha", "p_max", "second"]
 PARTS = ("mean", "low", "high")
@@ -89,7 +90,7 @@ def test_each_option_of_an_assistant_is_a_row_of_three_panels_with_a_line_a_choi
             for segment, interval in zip(bars.get_segments(), ends, strict=True):
                 assert segment[:, 1] == pytest.approx(factor * interval)
         assert len({container[0].get_linestyle() for container in axes.containers}) == 2
-    legend = [text.get_text() for text in panels[-1].get_legend().get_texts()]
+    legend = [text.get_text() for text in present(panels[-1].get_legend()).get_texts()]
     assert legend == ["p_max=0.8", "p_max=0.9"]
 
 

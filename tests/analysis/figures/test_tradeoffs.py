@@ -12,6 +12,7 @@ from qbumpers.analysis.figures.tradeoffs import (
     tradeoffs,
     tradeoffs_figure,
 )
+from tests.analysis.drawn import point_of, segments
 from tests.analysis.examples import BUMPERS, points_of, summary_row
 
 DENSE = [place / 10 for place in range(11)] + [0.9 + place / 100 for place in range(1, 10)]
@@ -88,7 +89,7 @@ def test_labels_stand_at_their_points_and_none_overlap():
             (row["alpha"], *(factor * row[f"{measure}_mean"] for measure in pair))
             for row in summary().iter_rows(named=True)
         }
-        assert all((float(t.get_text()), *t.xy) in places for t in axes.texts)
+        assert all((float(t.get_text()), *point_of(t)) in places for t in axes.texts)
         assert len(axes.texts) <= 2 * MOST_LABELS
         boxes = [text.get_window_extent() for text in axes.texts]
         for index, box in enumerate(boxes):
@@ -112,7 +113,7 @@ def test_single_trials_have_points_without_bars():
         segment
         for axes in drawing.axes
         for collection in axes.collections
-        for segment in collection.get_segments()
+        for segment in segments(collection)
     ]
     assert bars
     assert not any(np.ptp(segment, axis=0).any() for segment in bars)

@@ -118,7 +118,7 @@ def test_sentences_on_one_of_several_learners_say_which():
     assert all(sentence.startswith("With penalty=2: ") for sentence in found[half:])
 
 
-def found_of(trials=20, **parts):
+def found_of(trials: int | list[int] = 20, **parts):
     """Findings of conditions that have so many trials each."""
     return Findings(
         summary_table().with_columns(trials=pl.Series(np.broadcast_to(trials, len(ALPHAS)))),
@@ -127,7 +127,7 @@ def found_of(trials=20, **parts):
     )
 
 
-def warned(learner=None, trials=20, **changes):
+def warned(learner=None, trials: int | list[int] = 20, **changes):
     findings = found_of(trials, learners=[learner or about()])
     return cautions(findings, make_experiment(settings(**{"trials": 20, **changes})))
 

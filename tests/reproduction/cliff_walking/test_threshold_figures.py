@@ -19,6 +19,8 @@ from qbumpers.reproduction.cliff_walking.thresholds import (
 from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.cliff_walking import state_of
 from qbumpers.values import solve
+from tests.analysis.drawn import corners, xs, ys
+from tests.narrowing import present
 
 TABLE = solve(cliff_walking()).table
 ORANGE, WHITE = "#d55e00", "#ffffff"
@@ -31,8 +33,10 @@ def triangles(axes):
     collection = next(c for c in axes.collections if len(c.get_paths()) == 4 * len(positions()))
     assert isinstance(collection, PolyCollection)
     found = {}
-    for path, ink in zip(collection.get_paths(), collection.get_facecolor(), strict=True):
-        x, y = path.vertices[:3].mean(axis=0)
+    for path, ink in zip(
+        collection.get_paths(), np.asarray(collection.get_facecolor()), strict=True
+    ):
+        x, y = corners(path)[:3].mean(axis=0)
         place = (x % 1, y % 1)
         action = next(a for a, side in SIDES.items() if place == pytest.approx(side))
         found[int(y), int(x), action] = to_hex(ink)
@@ -67,8 +71,8 @@ def test_optimal_moves_are_green_and_the_rest_is_not():
 def test_the_two_cells_of_the_section_are_outlined():
     [axes] = values_figure(TABLE).axes
     outlines = [c for c in axes.collections if len(c.get_paths()) == 1]
-    corners = {tuple(outline.get_paths()[0].vertices.min(axis=0)) for outline in outlines}
-    assert corners == {(6.0, 2.0), (6.0, 1.0)}
+    places = {tuple(corners(outline.get_paths()[0]).min(axis=0)) for outline in outlines}
+    assert places == {(6.0, 2.0), (6.0, 1.0)}
 
 
 @pytest.mark.parametrize("alphas", [[0.0195], [0.5, 0.499, 0.0195]])
@@ -96,11 +100,11 @@ def test_shares_fall_in_steps_at_the_critical_thresholds():
     assert axes.get_xscale() == "log"
     assert axes.get_xlabel() == "threshold α (logarithmic)"
     assert axes.get_ylabel() == "suboptimal moves\noverridden, per cent"
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == list(KINDS)
+    assert [text.get_text() for text in present(axes.get_legend()).get_texts()] == list(KINDS)
     for kind, line in enumerate(axes.lines):
         own = [move.critical for move in moves if move.kind == kind]
         assert line.get_drawstyle() == "steps-post"
-        alphas, shares = line.get_data()
+        alphas, shares = xs(line), ys(line)
         assert {0.001, 1.0} <= set(alphas)
         for alpha in (0.002, 0.0105, 0.0185, 0.3, 0.75, 1.0):
             place = np.searchsorted(alphas, alpha, side="right") - 1

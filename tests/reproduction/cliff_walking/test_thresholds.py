@@ -192,8 +192,8 @@ def critical_of(move):
 
 def test_the_story_tells_the_two_cells_and_the_behaviours():
     story = summarise_thresholds(TABLE, PAPER)
-    told = {(row, column, name): rest for row, column, name, *rest in story.examples}
-    assert told == {
+    found = {(row, column, name): rest for row, column, name, *rest in story.examples}
+    assert found == {
         (1, 6, "up"): [91, 93, 1.0],
         (1, 6, "left"): [91, 93, 1.0],
         (2, 6, "up"): [92, 94, pytest.approx(2 / 107)],

@@ -41,7 +41,7 @@ def episodes_of(named, trial, length, generator):
     level = level_of(name, alpha) + generator.normal(0, 25, 2)
     grown = 1 - np.exp(-np.arange(length) / (0.08 * length))
     steps = generator.integers(100, 500, (2, length))
-    # Helped people return much from the beginning on.
+    # Assisted learners return much from the beginning on.
     start = np.array([level[0] - 40 if override_rate_of(name, alpha) else -200.0, -200.0])
     returns = start[:, None] + grown * (level - start)[:, None]
     returns += generator.normal(0, 70, (2, length))

@@ -1,5 +1,7 @@
 """Claims in words, judged from trials whose truth is known."""
 
+from typing import Any
+
 import numpy as np
 import polars as pl
 import pytest
@@ -47,7 +49,7 @@ def trials_of(bumpers, thresholds, spread=5.0, trials=10, seed=4):
     return pl.DataFrame(rows, schema_overrides={"alpha": pl.Float64}, infer_schema_length=None)
 
 
-AS_CLAIMED = {
+AS_CLAIMED: dict[str, Any] = {
     "bumpers": {0.0: (220.0, -100.0, 0.1), 0.5: (210.0, 50.0, 0.5), 1.0: (190.0, 150.0, 0.8)},
     "thresholds": {
         0.0: (200.0, -200.0, 0.0), 0.9: (170.0, -150.0, 0.05), 0.95: (168.0, -150.0, 0.05),

@@ -4,8 +4,10 @@ import gymnasium
 import numpy as np
 import pytest
 
+from qbumpers.tasks.lunar_lander.environment import LunarLander
 from qbumpers.tasks.lunar_lander.stepper import Lander
 from qbumpers.tasks.undoing import undo_of
+from tests.narrowing import of_kind
 from tests.tasks.landing import actions_of
 
 NAME = "qbumpers/LunarLander-v0"
@@ -44,7 +46,7 @@ def test_an_end_is_undone():
     lander, undisturbed, choose = Lander(), Lander(), actions_of("random", 0)
     lander.reset()
     undisturbed.reset()
-    events, taken = 0, []
+    events, taken, before = 0, [], ()
     while not events:
         before = lander.snapshot()
         taken.append(choose(None))
@@ -91,7 +93,7 @@ def test_the_environment_goes_on_as_if_nothing_had_been_undone(render_mode, seed
 
 
 def test_the_noise_of_the_environment_is_where_it_was():
-    environment = gymnasium.make(NAME).unwrapped
+    environment = of_kind(LunarLander, gymnasium.make(NAME).unwrapped)
     environment.reset(seed=0)
     for action in (2, 1, 0):
         environment.step(action)
@@ -107,10 +109,11 @@ def test_the_picture_is_of_the_state_that_was_put_back():
     environment.reset()
     for _ in range(5):
         environment.step(0)
-    before, picture = environment.unwrapped.snapshot(), environment.render()
+    inner = of_kind(LunarLander, environment.unwrapped)
+    before, picture = inner.snapshot(), of_kind(np.ndarray, environment.render())
     for _ in range(9):
         environment.step(0)
-    assert not np.array_equal(environment.render(), picture)
-    environment.unwrapped.restore(before)
-    assert np.array_equal(environment.render(), picture)
+    assert not np.array_equal(of_kind(np.ndarray, environment.render()), picture)
+    inner.restore(before)
+    assert np.array_equal(of_kind(np.ndarray, environment.render()), picture)
     environment.close()

@@ -195,8 +195,9 @@ def _clusters(rows: pl.DataFrame, offsets: np.ndarray) -> list[pl.DataFrame]:
     """The conditions of each assistant that lie too close together for their labels; two at most.
 
     Args:
-        rows: of the main panel.
-        offsets: of their labels, NaN if there is no room.
+        rows: the conditions that the main panel draws, in the order of `offsets`.
+        offsets: where their labels stand, float64 [N, 2], from `room_for_labels`; NaN if they have
+            no place.
     """
     marked = rows.with_columns(crowded=pl.Series(np.isnan(offsets[:, 0])))
     parts = marked.partition_by("assistant", maintain_order=True)

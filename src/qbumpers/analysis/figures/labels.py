@@ -22,7 +22,7 @@ def room_for_labels(places: np.ndarray, labels: Sequence[str], size: np.ndarray)
         places: of points, float64 [N, 2], in inches from the lower left corner of the axes; no
             label covers any of them, or another label.
         labels: of the first points; the rest have none.
-        size: of the axes, width and height in inches.
+        size: width and height of the axes, in inches.
 
     Returns:
         float64 [len(labels), 2], centres of labels relative to their points, in inches; NaN if

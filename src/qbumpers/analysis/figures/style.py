@@ -29,7 +29,7 @@ class Look(NamedTuple):
 
     Attributes:
         colour: as "#rrggbb".
-        marker: of Matplotlib.
+        marker: shape of its points, as Matplotlib names it.
     """
 
     colour: str
@@ -132,6 +132,15 @@ def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
 
 
 @contextmanager
+def _style() -> Iterator[None]:
+    """The common style, whatever settings of their own a user or a notebook has."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+@contextmanager
 def figure(width: float, height: float) -> Iterator[Figure]:
     """An empty figure in the common style.
 
@@ -142,7 +151,7 @@ def figure(width: float, height: float) -> Iterator[Figure]:
     Yields:
         The figure, with its layout managed.
     """
-    with mpl.rc_context(_STYLE):
+    with _style():
         yield Figure(figsize=(width, height), layout="constrained")
 
 
@@ -150,15 +159,15 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     """Write a figure as PNG and SVG, atomically.
 
     Args:
-        drawing: the figure.
-        folder: where to.
+        drawing: what is to be saved.
+        folder: where the files go.
         name: without ending.
 
     Returns:
         The path of the PNG.
     """
     vector, pixels = (folder / f"{name}.{ending}" for ending in ("svg", "png"))
-    with mpl.rc_context(_STYLE):
+    with _style():
         # Once for both, and not by `savefig`, which would draw everything twice for each.
         drawing.dpi = _STYLE["savefig.dpi"]
         drawing.draw_without_rendering()

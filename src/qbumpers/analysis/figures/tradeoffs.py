@@ -112,8 +112,8 @@ def labelled(assistants: Sequence[str], alphas: Sequence[float | None]) -> list[
     """Which conditions to label with their alpha, those that matter most first.
 
     Args:
-        assistants: of the conditions.
-        alphas: of the conditions; None if the assistant has none.
+        assistants: name of the assistant of each condition.
+        alphas: alpha of each condition; None if its assistant has none.
 
     Returns:
         Places of at most `MOST_LABELS` conditions of each assistant that has several: the ends of

@@ -26,8 +26,8 @@ def drawings(results: Results, findings: Findings) -> list[Drawing]:
     """Every figure of a report.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
 
     Returns:
         The figures, learner by learner; those that are added come last.

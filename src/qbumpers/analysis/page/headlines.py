@@ -20,7 +20,7 @@ def headlines(findings: Findings) -> list[str]:
     """What came out, the most important first.
 
     Args:
-        findings: the tables.
+        findings: what the tables say about a run.
 
     Returns:
         Sentences; those on one of several learners begin with what distinguishes it.
@@ -142,7 +142,7 @@ def cautions(findings: Findings, experiment: Experiment) -> list[str]:
     """What to keep in mind when reading the results.
 
     Args:
-        findings: the tables.
+        findings: what the tables say about a run.
         experiment: as run.
 
     Returns:

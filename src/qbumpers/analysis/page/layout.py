@@ -46,8 +46,8 @@ def page(
     """The page of a report.
 
     Args:
-        folder: of the run.
-        results: of the run.
+        folder: output folder of the run.
+        results: what that folder holds.
         findings: what its tables say.
         pictures: every figure.
         tables: CSV files, offered for download.

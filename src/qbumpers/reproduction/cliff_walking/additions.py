@@ -42,8 +42,8 @@ def additions(results: Results, findings: Findings, why: str) -> Additions:
     """Comparisons with printed numbers, and why no threshold serves.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
         why: the results cannot be held against the paper's; empty if they can.
     """
     numbers = printed_numbers("cliff-walking")
@@ -87,7 +87,7 @@ def thresholds_section(table: np.ndarray, summary: ThresholdSummary) -> Section:
 
     Args:
         table: Q* of Cliff Walking, float64 [48, 4].
-        summary: the numbers of Section 4.1.
+        summary: the numbers of Section 4.1, worked out from Q*.
     """
     introduction = Markup(
         "<p>Local Q-Thresholding overrides a move if its value falls short of the best by more "

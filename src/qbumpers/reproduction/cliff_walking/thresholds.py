@@ -24,9 +24,9 @@ class Move(NamedTuple):
     """A suboptimal move.
 
     Attributes:
-        row: where it starts.
-        column: where it starts.
-        action: its number.
+        row: row of the cell in which it starts.
+        column: column of that cell.
+        action: number of the action, in [0, 4).
         kind: index into `KINDS`.
         critical: it is overridden if alpha is below this.
     """
@@ -80,7 +80,7 @@ def overridden(table: np.ndarray, alpha: float, second: bool = False) -> np.ndar
 
     Args:
         table: Q*, float64 [S, A].
-        alpha: its threshold.
+        alpha: threshold of the rule, in [0, 1].
         second: whether it overrides with the second-best action.
 
     Returns:
@@ -120,7 +120,7 @@ def distinct_behaviours(table: np.ndarray, alphas: Sequence[float], second: bool
 
     Args:
         table: Q*, float64 [S, A].
-        alphas: the thresholds.
+        alphas: thresholds of the rule, each in [0, 1].
         second: whether they override with the second-best action.
     """
     acted = [state_of(row, column) for row, column in positions()]

@@ -11,8 +11,8 @@ def additions(results: Results, findings: Findings, why: str) -> Additions:
     """The claims with their evidence, and the learning curves that say most about them.
 
     Args:
-        results: of the run.
-        findings: its tables.
+        results: what the run's output folder holds.
+        findings: what the tables say about these results.
         why: the results cannot be held against the paper's; empty if they can.
     """
     claims = experiment_claims(findings.trials, results.experiment)

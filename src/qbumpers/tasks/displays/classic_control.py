@@ -35,6 +35,7 @@ def cart_pole_display() -> Display:
     ]
 
     def scene(observation: Any, step: Step | None) -> list[Shape]:
+        """The cart, and its pole on an axle."""
         x, angle = (float(observation[0]) + edge) * per_metre, float(observation[2])
         axle = x, _GROUND - 7.5
         tip = axle[0] + per_metre * math.sin(angle), axle[1] - per_metre * math.cos(angle)
@@ -69,6 +70,7 @@ def mountain_car_display() -> Display:
     ]
 
     def scene(observation: Any, step: Step | None) -> list[Shape]:
+        """The car on its wheels, leaning with the road."""
         position = float(observation[0])
         x, y = place(position)
         slope = 1.35 * math.cos(3 * position)  # of the road
@@ -76,6 +78,7 @@ def mountain_car_display() -> Display:
         along, up = (1 / length, -slope / length), (-slope / length, -1 / length)
 
         def on_car(ahead: float, above: float) -> tuple[float, float]:
+            """A point of the car, in units of the display, from the middle of its bottom."""
             return x + along[0] * ahead + up[0] * above, y + along[1] * ahead + up[1] * above
 
         body = [(-20, 10), (-20, 20), (-10, 30), (8, 30), (20, 20), (20, 10)]

@@ -18,7 +18,7 @@ class Look(NamedTuple):
     """How a cell looks.
 
     Attributes:
-        colour: of the cell.
+        colour: what fills the cell, as "#rrggbb".
         ink: of its letter; none is written if empty.
         hole: colour of a hole in it; none if empty.
     """
@@ -68,6 +68,7 @@ def grid_display(
     ]
 
     def scene(state: Any, step: Step | None) -> list[Shape]:
+        """The walker, a disc in the middle of its cell."""
         row, column = divmod(int(state), columns)
         return [circle(_centre(row, column), 0.27 * CELL, "#e8890c", "#8a4d00", _LINE)]
 

@@ -135,7 +135,7 @@ def _leg(surface: np.ndarray, placed: Placed, side: int, touches: bool) -> list[
     The observation does not tell its angle: it is spread as far as the ground demands.
 
     Args:
-        surface: of the ground, [N, 2], in pixels.
+        surface: points of the ground, float64 [N, 2], in pixels.
         placed: puts points beside the hull.
         side: -1 or 1, as Gymnasium counts; -1 is the leg on the right.
         touches: whether it has contact.

@@ -44,6 +44,7 @@ def taxi_display(desc: Sequence[str]) -> Display:
     width, height = columns * CELL + 2 * _EDGE, rows * CELL + 2 * _EDGE
 
     def scene(state: Any, step: Step | None) -> list[Shape]:
+        """The flag, the taxi, and the passenger beside it or in it."""
         places = np.unravel_index(int(state), (rows, columns, len(STANDS) + 1, len(STANDS)))
         row, column, passenger, destination = (int(place) for place in places)
         taxi = _centre(row, column)
@@ -99,7 +100,7 @@ def _person(place: Place) -> list[Shape]:
 
 
 def _car(place: Place, riding: bool) -> list[Shape]:
-    """A taxi from the side; with its passenger at the window if somebody rides."""
+    """A taxi from the side; with its passenger at the window, if one rides."""
     x, y = place[0], place[1] + 4
     body = [
         (x - 25, y + 8), (x - 25, y - 2), (x - 16, y - 4), (x - 10, y - 15),

@@ -1,5 +1,6 @@
 """Lunar Lander with the same terrain and noise in every episode (Section 4.3)."""
 
+import functools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -10,7 +11,7 @@ import numpy as np
 from qbumpers.decisions import Step
 from qbumpers.tasks.display import unassisted_step
 from qbumpers.tasks.displays.lunar_lander import lunar_lander_display
-from qbumpers.tasks.drawing import picture
+from qbumpers.tasks.drawing import Painter
 
 # First, for its message if Box2D is missing.
 from qbumpers.tasks.lunar_lander.stepper import chance_of
@@ -36,7 +37,6 @@ class LunarLander(original.LunarLander):
         self._terrain_seed = seed
         self._chance = chance_of(seed)
         self._actions: list[int] = []
-        self._display = lunar_lander_display(seed)
         self._observation = np.zeros(8, np.float32)
         self._last_step: Step | None = None
         super().__init__(render_mode=render_mode)
@@ -79,7 +79,11 @@ class LunarLander(original.LunarLander):
         """For "rgb_array" the picture of the display, uint8 [H, W, 3]; Gymnasium's for "human"."""
         if self.render_mode != "rgb_array":
             return super().render()
-        return picture(self._display, self._observation, self._last_step)
+        return self._painter.picture(self._observation, self._last_step)
+
+    @functools.cached_property
+    def _painter(self) -> Painter:
+        return Painter(lunar_lander_display(self._terrain_seed))
 
     def snapshot(self) -> tuple[int, ...]:
         """The actions of the episode so far: all that its state comes from."""
