@@ -17,6 +17,7 @@ import tomli_w
 import qbumpers
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
+from qbumpers.experiments.columns import EPISODE_COLUMNS, STATE_COLUMNS, check_columns
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.record import (
     CONDITIONS,
@@ -48,6 +49,8 @@ EXPERIMENT, EPISODES, STATES, VALUES = (
     "values.npz",
 )
 """Files of an output folder; design and platform, a row per episode, a row per state, Q*."""
+
+_COLUMNS = {EPISODES: EPISODE_COLUMNS, STATES: STATE_COLUMNS}
 
 NEEDED = (EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES)
 """What the analysis reads."""
@@ -312,13 +315,20 @@ def load(folder: str | Path) -> Results:
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
+    for name, table in tables.items():
+        check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
     conditions = conditions_of(folder, experiment, episodes)
     rows = len(conditions) * experiment.trials * (experiment.episodes + experiment.retention)
     ids = {each.condition for each in conditions}
     if episodes.height != rows or set(episodes["condition"].unique()) != ids:
         raise _unfinished(place)
-    values = decoded_values(place.read(VALUES) or b"", f"{folder}/{VALUES}")
+    kept = place.read(VALUES)
+    if kept is None:
+        raise _unfinished(place)
+    values = decoded_values(kept, f"{folder}/{VALUES}")
+    if isinstance(values, TabularValues) != experiment.tabular:
+        raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
     return Results(experiment, episodes, tables.get(STATES), values, conditions)
 
 
@@ -382,8 +392,11 @@ def _read_design(folder: Folder) -> Experiment | None:
     content = folder.read(EXPERIMENT)
     if content is None:
         return None
-    settings = parsed(content, f"experiment file {folder}/{EXPERIMENT}")
-    found = settings.get("run", {}).get("format", 1)
+    where = f"experiment file {folder}/{EXPERIMENT}"
+    settings = parsed(content, where)
+    if not isinstance(settings.get("run"), dict):
+        raise RequestError(f"{where}: it has no table [run]; is it the one that a run wrote?")
+    found = settings["run"].get("format", 1)
     if found not in _READ:
         age = "a newer" if isinstance(found, int) and found > FORMAT else "an older"
         raise RequestError(
@@ -391,7 +404,7 @@ def _read_design(folder: Folder) -> Experiment | None:
             f"needed {FORMAT}); choose another folder"
         )
     del settings["run"]
-    return recorded_experiment(settings, f"experiment file {folder}/{EXPERIMENT}")
+    return recorded_experiment(settings, where)
 
 
 def _check_same(folder: Folder, found: Experiment, experiment: Experiment) -> None:

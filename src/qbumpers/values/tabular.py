@@ -157,8 +157,8 @@ def load_values(path: str | Path) -> TabularValues | NetworkValues:
         content = Path(path).read_bytes()
     except FileNotFoundError as error:
         raise RequestError(f"values file {path}: there is none") from error
-    except OSError as error:
-        reason = error.strerror or error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
         raise RequestError(f"values file {path}: not a file of Q values ({reason})") from error
     return decoded_values(content, str(path))
 
@@ -200,6 +200,8 @@ def _reason(content: bytes, version: str, error: Exception) -> str:
     """Why a file cannot be read."""
     if version not in ("", qbumpers.__version__):
         return f"written by qbumpers {version}, and this is {qbumpers.__version__} ({error})"
+    if not content.startswith(b"PK"):
+        return f"not a file of Q values ({'no archive of NumPy' if content else 'it is empty'})"
     if b"_stable_baselines3_version" in content:
         return (
             "a model of Stable-Baselines3; convert it by qbumpers.experts.from_stable_baselines "
