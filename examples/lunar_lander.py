@@ -1,6 +1,6 @@
-"""Land on the moon with somebody who presses keys at random, and keep the pictures.
+"""Land on the moon with an agent that acts at random, and save the pictures.
 
-The expert that ships with the package lends a hand, in three ways; each landing becomes an
+The expert that ships with the package assists it in three ways; each landing becomes an
 animation in the current folder, framed in red when the assistant takes over. Needs the extra
 `lunar` (in a checkout, `pip install -e ".[lunar]"`). Takes a few seconds.
 """

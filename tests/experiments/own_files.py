@@ -117,7 +117,9 @@ class OwnFiles:
     def register_learner(self, **changes):
         module = self.imported("own_learner")
         parts = {p: getattr(module, p) for p in ("start", "choose", "prefer", "policy", "learn")}
-        register_learner("own", module.Settings, **parts, **changes)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an edited one may not be compiled
+            register_learner("own", module.Settings, **parts, **changes)
 
     def register_environment(self, **given):
         module = self.imported("own_environment")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces, wrappers
+from gymnasium.envs.registration import EnvSpec
 from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack, VecMonitor, VecNormalize
 
@@ -199,7 +200,7 @@ def test_what_a_models_own_file_does_not_say_is_said(task, normalised_model, tmp
 
 
 def test_statistics_of_gymnasium_become_part_too(task, observations):
-    environment = pole(wrappers.NormalizeObservation)
+    environment: Any = pole(wrappers.NormalizeObservation)
     model = trained(environment=environment, **SHORT)
     values = from_stable_baselines(model, task)
     environment.update_running_mean = False
@@ -232,7 +233,7 @@ def registered_pole(monkeypatch):
     """Registers CartPole with a wrapper, and forgets it; its id."""
 
     def register(wrapper):
-        spec = gymnasium.envs.registration.EnvSpec(
+        spec = EnvSpec(
             "WrappedPole-v0", "gymnasium.envs.classic_control:CartPoleEnv", max_episode_steps=500,
             additional_wrappers=(wrapper,),
         )  # fmt: skip
@@ -258,7 +259,9 @@ def test_a_spread_too_small_for_the_network_is_refused(registered_pole):
 UNIT = spaces.Box(-1, 1, (4,), np.float32)
 OTHER = {
     "TransformObservation": lambda env: wrappers.TransformObservation(env, np.tanh, UNIT),
-    "TransformReward": lambda env: wrappers.TransformReward(env, lambda reward: reward / 100),
+    "TransformReward": lambda env: wrappers.TransformReward(
+        env, lambda reward: float(reward) / 100
+    ),
     "NormalizeReward": wrappers.NormalizeReward,
     "StickyAction": lambda env: wrappers.StickyAction(env, 0.1),
 }

@@ -1,5 +1,7 @@
 """Gymnasium environments with transition tables that tests wrap, shift and falsify."""
 
+from typing import Any
+
 import gymnasium
 from gymnasium import spaces
 from gymnasium.envs.toy_text import FrozenLakeEnv
@@ -57,19 +59,19 @@ class Impatient(FrozenLakeEnv):
         self.steps = 0
         return super().reset(seed=seed)
 
-    def step(self, a):
+    def step(self, a) -> Any:
         self.steps += 1
         observation, reward, terminated, _, info = super().step(a)
         return observation, reward, terminated, self.steps >= 12, info
 
 
-class Tabled(gymnasium.Env):
+class Tabled(gymnasium.Env[Any, Any]):
     """An environment of a task with a table, whose numbers may start anywhere."""
 
     def __init__(self, seed=0, first_state=0, first_action=0, table_counts_alike=True):
         self.task_of_table = task = random_task(seed, 6, 3)
-        self.observation_space = spaces.Discrete(6, start=first_state)
-        self.action_space = spaces.Discrete(3, start=first_action)
+        self.observation_space: Any = spaces.Discrete(6, start=first_state)
+        self.action_space: Any = spaces.Discrete(3, start=first_action)
         state, action = (first_state, first_action) if table_counts_alike else (0, 0)
         self.P = {
             s + state: {

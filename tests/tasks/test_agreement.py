@@ -1,6 +1,7 @@
 """Tables held to steps of their environments: right ones pass, wrong ones are refused."""
 
 import math
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -54,7 +55,7 @@ def test_the_passenger_of_the_taxi_who_changes_the_goal_is_no_part_of_its_table(
 class Rounded(FrozenLakeEnv):
     """Shows its state as a float."""
 
-    def step(self, a):
+    def step(self, a) -> Any:
         observation, *rest = super().step(a)
         return float(observation), *rest
 

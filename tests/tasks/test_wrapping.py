@@ -1,5 +1,7 @@
 """Wrappers between a caller's environment and its table: followed, or refused by name."""
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import make_experiment
 from tests.tasks.lakes import frozen
 
-COST = TransformReward.wrapper_spec(func=lambda reward: 100 * reward - 1)
+COST = TransformReward.wrapper_spec(func=lambda reward: 100 * float(reward) - 1)
 # Six steps at a cost of 1 each, and 100 for the last.
 TRUE_VALUE = sum(-(0.99**t) for t in range(6)) + 100 * 0.99**5
 
@@ -23,7 +25,7 @@ def register():
     """Registers environments, and forgets them."""
     before = dict(gymnasium.registry)
 
-    def registered(name, entry_point=FrozenLakeEnv, **fields):
+    def registered(name, entry_point: Any = FrozenLakeEnv, **fields):
         gymnasium.register(name, entry_point=entry_point, max_episode_steps=100, **fields)
         return name
 
@@ -33,7 +35,7 @@ def register():
 
 
 def costly():
-    return TransformReward(frozen(), lambda reward: 100 * reward - 1)
+    return TransformReward(frozen(), lambda reward: 100 * float(reward) - 1)
 
 
 def task_of(environment, **arguments):
@@ -61,7 +63,7 @@ def test_values_are_those_of_the_wrapped_rewards():
 
 def test_functions_of_rewards_are_applied_from_the_inside_out():
     doubled_then_clipped = wrappers.ClipReward(
-        TransformReward(frozen(), lambda reward: 2 * reward - 0.1), max_reward=1.0
+        TransformReward(frozen(), lambda reward: 2 * float(reward) - 0.1), max_reward=1.0
     )
     values = solve(task_of(doubled_then_clipped))
     expected = sum(-0.1 * 0.99**t for t in range(5)) + 0.99**5
@@ -112,20 +114,24 @@ class Sticky(gymnasium.Wrapper):
 class Patience(TimeLimit):
     """Gymnasium's limit, and something of its own."""
 
-    def step(self, action):
+    def step(self, action) -> Any:
         observation, reward, *rest = super().step(action)
         return observation, float(reward) - 1, *rest
 
 
 class Shaped(gymnasium.RewardWrapper):
     def reward(self, reward):
-        return reward - 1
+        return float(reward) - 1
+
+
+def mirrored(action: Any) -> Any:
+    return 3 - action
 
 
 ALTERING = {
     "Sticky": Sticky,
     "StickyAction": lambda env: wrappers.StickyAction(env, 0.25),
-    "TransformAction": lambda env: wrappers.TransformAction(env, lambda a: 3 - a, None),
+    "TransformAction": lambda env: wrappers.TransformAction(env, mirrored, None),
     "TransformObservation": lambda env: wrappers.TransformObservation(env, lambda s: 15 - s, None),
     "NormalizeReward": wrappers.NormalizeReward,
     "Patience": lambda env: Patience(env, 50),
@@ -166,7 +172,7 @@ def test_a_function_of_rewards_that_remembers_is_found_out():
 
 def test_a_function_of_rewards_that_fails_is_named():
     with pytest.raises(RequestError, match=r"TransformReward fails at the reward 0\.0: .*division"):
-        task_of(TransformReward(frozen(), lambda reward: 1 / reward))
+        task_of(TransformReward(frozen(), lambda reward: 1 / float(reward)))
 
 
 def test_the_limit_is_the_first_to_be_reached(register):

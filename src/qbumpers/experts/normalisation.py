@@ -118,7 +118,8 @@ def statistics_in_training(model: Any, own: list[str], where: str) -> Any:
     from stable_baselines3.common import vec_env
 
     harmless = (vec_env.VecMonitor, vec_env.VecCheckNan, vec_env.VecVideoRecorder)
-    found, layer = [], model.get_env()
+    found: list[Any] = []
+    layer: Any = model.get_env()
     while isinstance(layer, vec_env.VecEnvWrapper):
         if isinstance(layer, vec_env.VecNormalize):
             found.append(layer)

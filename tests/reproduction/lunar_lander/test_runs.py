@@ -82,7 +82,7 @@ def test_finished_experts_are_not_trained_again(script):
 def test_the_second_expert_is_the_best_of_the_others(monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(DOCS)
     script = importlib.import_module("run_lunar_lander")
-    experts = [network_of(seed=seed) for seed in range(4)]
+    experts = [network_of(seed=seed, inputs=8, actions=4, task="lunar-lander") for seed in range(4)]
     merits = [0.5, 0.9, 0.7, 0.8]
     for number, values in enumerate(experts):
         values.save(tmp_path / "expert.npz.work" / f"seed-{number}.npz")
