@@ -327,7 +327,7 @@ def load(folder: str | Path) -> Results:
     if kept is None:
         raise _unfinished(place)
     values = decoded_values(kept, f"{folder}/{VALUES}")
-    if isinstance(values, TabularValues) != experiment.tabular:
+    if experiment.tabular and not isinstance(values, TabularValues):
         raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
     return Results(experiment, episodes, tables.get(STATES), values, conditions)
 
