@@ -16,7 +16,7 @@ test: $(VENV)/installed-dev  ## Run the tests, some minutes
 test-slow: $(VENV)/installed-dev  ## Run the longer checks
 	$(BIN)/pytest -m slow -n 2
 
-lint: $(VENV)/installed-dev  ## Check style, types and which way imports point
+lint: $(VENV)/installed-dev $(VENV)/installed-docs  ## Check style, types and which way imports point
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
