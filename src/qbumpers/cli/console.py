@@ -73,8 +73,10 @@ def table(*columns: str) -> Table:
     return made
 
 
-def interval(mean: float, low: float | None, high: float | None, digits: int = 1) -> str:
-    """A mean with half the width of its interval, if it has one."""
+def interval(mean: float | None, low: float | None, high: float | None, digits: int = 1) -> str:
+    """A mean with half the width of its interval, if it has one; a dash if it is not known."""
+    if mean is None:
+        return "-"
     digits = decimals_for(low, high, digits)
     if low is None or high is None or not math.isfinite(low):
         return f"{mean:.{digits}f}"
