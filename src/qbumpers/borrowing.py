@@ -41,6 +41,7 @@ def _compiled_borrow(arrays: Any) -> Any:
 @intrinsic
 def _uncounted(typing_context: Any, arrays: Any) -> Any:
     def strip(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        """A value with no array in it counted; `kind` is its type."""
         if isinstance(kind, types.Array):
             view: Any = arrayobj.make_array(kind)(context, builder, value)
             view.meminfo = cgutils.get_null_value(view.meminfo.type)
@@ -53,6 +54,7 @@ def _uncounted(typing_context: Any, arrays: Any) -> Any:
         return value
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The code of a call: the same value, uncounted."""
         return strip(context, builder, arrays, arguments[0])
 
     return arrays(arrays), generate
@@ -75,6 +77,7 @@ def _compiled_hold(arrays: Any) -> Any:
 @intrinsic
 def _used(typing_context: Any, arrays: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The code of a call: nothing but a use of the argument."""
         return context.get_dummy_value()
 
     return types.none(arrays), generate
@@ -109,6 +112,7 @@ def _compiled_read_only(arrays: Any) -> Any:
 @intrinsic
 def _typed_read_only(typing_context: Any, arrays: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The code of a call: the same array, counted once more."""
         if context.enable_nrt:
             context.nrt.incref(builder, arrays, arguments[0])
         return arguments[0]
@@ -141,6 +145,7 @@ def _borrowed(typing_context: Any, table: Any, index: Any, width: Any) -> Any:
     row_type = types.Array(table.dtype, table.ndim - 1, "C", readonly=not table.mutable)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The code of a call: a view into the table."""
         source = arrayobj.make_array(table)(context, builder, arguments[0])
         integer = context.get_value_type(types.intp)
         size = integer(context.get_abi_sizeof(context.get_data_type(table.dtype)))

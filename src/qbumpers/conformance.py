@@ -161,10 +161,12 @@ class _Recorded(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
+        """Begin where the next recorded step did."""
         super().reset(seed=seed)
         return self._steps[self._next].state, {}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Answer what the next recorded step tells, whatever the action."""
         step = self._steps[self._next]
         self._next += 1
         info = {"success": bool(step.events & SUCCESS), "crash": bool(step.events & CRASH)}

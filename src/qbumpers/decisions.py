@@ -252,6 +252,18 @@ def is_action(action: float, actions: int) -> bool:
 
 
 @inlined
+def proposal_of(action: float, actions: int) -> int:
+    """What a learner proposes, if there is such an action.
+
+    Raises:
+        RequestError: if it is not a whole number in [0, `actions`).
+    """
+    if not is_action(action, actions):
+        raise RequestError("the learner's action is not a whole number in [0, actions)")
+    return int(action)
+
+
+@inlined
 def execution_of(decision: Decision, undone: bool, actions: int) -> Execution:
     """What a decision asks for, if it can be done.
 

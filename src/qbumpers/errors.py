@@ -32,6 +32,25 @@ def whole_number(value: Any, where: str, allowed: str) -> int:
         raise RequestError(f"{where} = {value!r}; a whole number {allowed} is needed") from error
 
 
+def action_number(value: Any, where: str, first: int, actions: int) -> int:
+    """The number of an action.
+
+    Args:
+        value: as for `whole_number`.
+        where: for the message, for instance "action".
+        first: number of the first action.
+        actions: how many there are.
+
+    Raises:
+        RequestError: if it is not whole, or not one of those actions.
+    """
+    allowed = f"in [{first}, {first + actions})"
+    number = whole_number(value, where, allowed)
+    if not first <= number < first + actions:
+        raise RequestError(f"{where} = {value!r}; it must lie {allowed}")
+    return number
+
+
 def in_short(value: Any) -> str:
     """A value as messages show it: in one line that is not long."""
     shown = " ".join(repr(value).split())

@@ -28,7 +28,7 @@ from qbumpers.decisions import (
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError, whole_number
+from qbumpers.errors import RequestError, action_number
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
@@ -120,9 +120,7 @@ class Session:
             missing = "begin(state)" if row is None else "record(...) of the last decision"
             raise RequestError(f"decide: {missing} must come first")
         actions = self.model.actions
-        proposed = whole_number(proposed, "proposed", f"in [0, {actions})")
-        if not 0 <= proposed < actions:
-            raise RequestError(f"proposed = {proposed!r}; it must lie in [0, {actions})")
+        proposed = action_number(proposed, "proposed", 0, actions)
         situation = situate(self.account, self.state, row, self._others_now, proposed)
         decision = self.assistant.decide(situation, noise, self._memory)
         try:

@@ -10,7 +10,7 @@ from gymnasium.utils import RecordConstructorArgs
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model, Noise, Step
-from qbumpers.errors import RequestError, check_number, whole_number
+from qbumpers.errors import RequestError, action_number, check_number
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
@@ -147,10 +147,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             raise gymnasium.error.ResetNeeded(
                 "call reset() before step(), and after an episode's end"
             )
-        allowed = f"in [{first}, {first + self._actions})"
-        proposed = whole_number(action, "action", allowed) - first
-        if not 0 <= proposed < self._actions:
-            raise RequestError(f"action = {action!r}; it must lie {allowed}")
+        proposed = action_number(action, "action", first, self._actions) - first
         decision = session.decide(proposed, self._next_noise())
         before = self._undo[0]() if decision.undo and self._undo else None
         observation, reward, terminated, truncated, info = self.env.step(decision.action + first)

@@ -108,16 +108,20 @@ def test_a_rule_cannot_change_what_it_reads(rule, make):
         run(make(), trials=1)
 
 
-def test_a_learner_that_chooses_no_action_stops_the_simulation():
-    def choose_far_away(settings, memory, state, rates, stream):
-        return 4 if state == 36 else 0
-
+def assert_stopped(choose, prefer):
     settings = register_learner(
-        "far-away", Averaging, start=first_values, choose=choose_far_away, prefer=prefer_best,
+        "far-away", Averaging, start=first_values, choose=choose, prefer=prefer,
         policy=always_best, learn=average,
     )  # fmt: skip
     with pytest.raises(RequestError, match="the learner's action is not a whole number"):
         simulate(cliff_walking(), "none", learner=settings(), episodes=1, trials=1)
+
+
+def test_a_learner_that_chooses_no_action_stops_the_simulation():
+    def choose_far_away(settings, memory, state, rates, stream):
+        return 4 if state == 36 else 0
+
+    assert_stopped(choose=choose_far_away, prefer=prefer_best)
 
 
 def test_a_learner_that_prefers_no_action_stops_the_simulation():
@@ -127,9 +131,4 @@ def test_a_learner_that_prefers_no_action_stops_the_simulation():
     def choose_up(settings, memory, state, rates, stream):
         return 0
 
-    settings = register_learner(
-        "far-away", Averaging, start=first_values, choose=choose_up, prefer=prefer_far_away,
-        policy=always_best, learn=average,
-    )  # fmt: skip
-    with pytest.raises(RequestError, match="the learner's action is not a whole number"):
-        simulate(cliff_walking(), "none", learner=settings(), episodes=1, trials=1)
+    assert_stopped(choose=choose_up, prefer=prefer_far_away)

@@ -10,7 +10,7 @@ from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.measures import MEASURES, trial_measures
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.record import CONDITIONS, Record, RecordedCondition
+from qbumpers.experiments.record import CONDITIONS, Record, RecordedCondition, decoded_record
 from qbumpers.experiments.store import (
     EXPERIMENT,
     conditions_of,
@@ -18,7 +18,7 @@ from qbumpers.experiments.store import (
     load_design,
     run_description,
 )
-from qbumpers.files import write_atomically
+from qbumpers.files import open_folder, write_atomically
 
 TRIALS, CURVES, OVERRIDES, RUNS = "trials.csv", "curves.csv", "overrides.csv", "runs.csv"
 """A row per trial; learning curves and override rates by block of episodes; trials of runs."""
@@ -92,13 +92,14 @@ def load_archive(folder: str | Path) -> Archive:
     """
     place = Path(folder)
     experiment, trials = load_design(place), read_trials(place / TRIALS)
+    record = decoded_record(open_folder(place).read(CONDITIONS))
     return Archive(
         experiment=experiment,
         run=run_description(place),
         trials=trials,
         curves=_read(place / CURVES),
         overrides=_read(place / OVERRIDES),
-        conditions=conditions_of(place, experiment, trials),
+        conditions=conditions_of(record, experiment, trials),
     )
 
 

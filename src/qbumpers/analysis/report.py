@@ -174,7 +174,7 @@ def _clear_figures(folder: Path, kept: Collection[str]) -> None:
     A figure of a report is three files; others that somebody put there are left alone.
 
     Args:
-        folder: of the figures.
+        folder: where the reports of a run draw their figures.
         kept: names of the figures that stay, without ending.
     """
     for path in folder.glob("*.svg"):

@@ -242,6 +242,7 @@ def _check_versions(ray: Any, address: str) -> None:
 
 def _asked_for_versions() -> Callable[[], dict[str, str]]:
     def found() -> dict[str, str]:  # a nested function travels whole: the package may lack there
+        """Versions on the node that this runs on."""
         try:
             from qbumpers.experiments.cluster import versions
         except ImportError as error:

@@ -65,7 +65,7 @@ def identity_of(
     """With what the numbers of a condition are made.
 
     Args:
-        assistant: of the condition.
+        assistant: whose rules, the ones below it too, are looked at.
         learner: its kind of learner.
         task: its task.
         engine: `revision` and `precision` of what simulates it.

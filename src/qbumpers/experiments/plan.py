@@ -123,8 +123,8 @@ def _noted(
     """What is noted of conditions; their code is looked at here, once, by the one who asks.
 
     Args:
-        task: of the experiment.
-        named: its conditions.
+        task: what every condition is simulated at.
+        named: the conditions, each with its content.
         conditions: the same by content.
         files: is filled with what is in the files that they name.
     """

@@ -90,13 +90,11 @@ def decoded_record(content: bytes | None) -> Record | None:
     """A record from what `encoded` gave; None if there is none, or it is damaged."""
     try:
         fields = json.loads(content or b"")
-        return Record(**{**fields, "conditions": [_condition(c) for c in fields["conditions"]]})
+        return Record(
+            **{**fields, "conditions": [RecordedCondition(**c) for c in fields["conditions"]]}
+        )
     except (ValueError, TypeError, KeyError):
         return None
-
-
-def _condition(fields: dict[str, Any]) -> RecordedCondition:
-    return RecordedCondition(**fields)
 
 
 def recorded(

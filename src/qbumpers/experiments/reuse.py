@@ -73,7 +73,7 @@ def usable_for(wanted: str, identity: str, record: Record) -> bool:
     Args:
         wanted: identity of the condition.
         identity: of what made the cell; empty if that was not noted.
-        record: of the conditions.
+        record: what is noted of the conditions, as they are now.
     """
     return record.allows_unmarked(wanted) if not identity else identity == wanted
 
@@ -107,7 +107,7 @@ def again(
     """Why finished trials are simulated again.
 
     Args:
-        record: of the conditions.
+        record: what is noted of the conditions, as they are now.
         before: what the folder noted until now; None if that is nothing.
         cells: that are used, by their content.
         stale: finds the files of cells that are not, by their content.

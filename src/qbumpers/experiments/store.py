@@ -84,28 +84,25 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
             unless that is allowed and some trials are.
     """
     place = open_folder(folder)
-    experiment = load_design(folder)
-    tables = _whole_tables(place, experiment)
-    if tables is None:
-        record = decoded_record(place.read(CONDITIONS))
-        tables = _tables_of_cells(place, experiment, record) if unfinished and record else None
-    if tables is None:
-        raise RequestError(
-            f"results folder {folder}: the run is not finished; run it again to continue"
-        )
-    conditions = conditions_of(folder, experiment, tables[EPISODES])
+    experiment, record = load_design(folder), decoded_record(place.read(CONDITIONS))
+    tables = _whole_tables(place, experiment, record)
+    if tables is None and unfinished and record is not None:
+        tables = _tables_of_cells(place, experiment, record)
     kept = place.read(VALUES)
-    if kept is None:
+    if tables is None or kept is None:
         raise RequestError(
             f"results folder {folder}: the run is not finished; run it again to continue"
         )
+    conditions = conditions_of(record, experiment, tables[EPISODES])
     values = decoded_values(kept, f"{folder}/{VALUES}")
     if experiment.tabular and not isinstance(values, TabularValues):
         raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
     return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
 
 
-def _whole_tables(folder: Folder, experiment: Experiment) -> dict[str, pl.DataFrame] | None:
+def _whole_tables(
+    folder: Folder, experiment: Experiment, record: Record | None
+) -> dict[str, pl.DataFrame] | None:
     """The tables of a finished run; None if they are not there, or those of another part of it."""
     contents = {name: folder.read(name) for name in (EPISODES, STATES)}
     if any(contents[name] is None for name in tables_of(experiment)):
@@ -119,7 +116,7 @@ def _whole_tables(folder: Folder, experiment: Experiment) -> dict[str, pl.DataFr
     for name, table in tables.items():
         check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
-    ids = {each.condition for each in conditions_of(str(folder), experiment, episodes)}
+    ids = {each.condition for each in conditions_of(record, experiment, episodes)}
     rows = len(ids) * experiment.trials * (experiment.episodes + experiment.retention)
     whole = episodes.height == rows and set(episodes["condition"].unique()) == ids
     return tables if whole else None
@@ -153,22 +150,21 @@ def files_to_read(folder: str | Path) -> Iterator[str]:
     yield from NEEDED
     place = open_folder(folder)
     record = decoded_record(place.read(CONDITIONS))
-    if record is not None and _whole_tables(place, load_design(folder)) is None:
+    if record is not None and _whole_tables(place, load_design(folder), record) is None:
         for each in record.conditions:
             yield from (file.name for file in cell_files(place, each.content))
 
 
 def conditions_of(
-    folder: str | Path, experiment: Experiment, table: pl.DataFrame
+    record: Record | None, experiment: Experiment, table: pl.DataFrame
 ) -> Sequence[RecordedCondition]:
-    """What a folder notes of its conditions; an old one does not, then it is found out.
+    """The conditions of a run, found out if its folder does not note them, as old ones do not.
 
     Args:
-        folder: of the results.
+        record: what the folder notes; None if that is nothing.
         experiment: as run.
         table: with columns condition, assistant, alpha and learner.
     """
-    record = decoded_record(open_folder(folder).read(CONDITIONS))
     if record is not None:
         return record.conditions
     try:
@@ -219,8 +215,8 @@ def kept_files(folder: str | Path, each: RecordedCondition) -> dict[str, np.ndar
     """What was in the files that a condition named when it was run.
 
     Args:
-        folder: of the results.
-        each: the condition.
+        folder: output folder of a run, a path or a URL.
+        each: the condition, as the folder notes it.
 
     Returns:
         Float64 [N, K] by the name that the experiment has for a file; nothing from old folders.

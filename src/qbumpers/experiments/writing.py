@@ -35,8 +35,8 @@ from qbumpers.experiments.reuse import (
     whole_cells,
     whole_content,
 )
-from qbumpers.experiments.store import EXPERIMENT, FORMAT, VALUES, read_design
-from qbumpers.experiments.tables import EPISODES, STATES, assembled, encoded, tables_of
+from qbumpers.experiments.store import EXPERIMENT, FORMAT, NEEDED, VALUES, read_design
+from qbumpers.experiments.tables import assembled, encoded, tables_of
 from qbumpers.files import Folder, StoreError, open_folder
 from qbumpers.values import NetworkValues, TabularValues, decoded_values
 
@@ -158,7 +158,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
     Args:
         folder: where the results go, a path or a URL; made if it is missing.
         experiment: to be run, or continued.
-        record: of its conditions.
+        record: what is noted of its conditions, as they are now.
 
     Yields:
         The store, with what a killed run left half-written cleared away.
@@ -187,8 +187,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
 
 def _clear_left(folder: Folder, records: Sequence[Record]) -> None:
     """Clear away what killed runs left half-written of their own files, and of no others."""
-    own = {EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES}
-    folder.clear_left("", own.__contains__)
+    folder.clear_left("", NEEDED.__contains__)
     folder.clear_left(FILES, is_kept_file)
     for place in {cells_folder(each.content) for record in records for each in record.conditions}:
         folder.clear_left(place, is_cell_file)

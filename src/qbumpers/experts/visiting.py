@@ -65,10 +65,12 @@ class _LearningStepper:
         self._learn = entered(learn, *self._learner, example, *self._rest)
 
     def reset(self, chance: float) -> np.ndarray:
+        """Begin an episode."""
         self._observation = self._stepper.reset(chance)
         return self._observation
 
     def step(self, action: int) -> tuple[np.ndarray, float, int]:
+        """Take a step, from which the learner learns."""
         observation, reward, event = self._stepper.step(action)
         terminated = event & TERMINATED != 0
         happened = Transition(self._observation, action, reward, observation, terminated, -1)

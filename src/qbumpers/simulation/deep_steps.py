@@ -17,13 +17,12 @@ from qbumpers.decisions import (
     Execution,
     Noise,
     execution_of,
-    is_action,
     projected_return,
+    proposal_of,
     settle,
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import choose, learn, prefer
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
@@ -176,9 +175,8 @@ def act(
         numbers[START_VALUE] = best_value(row)
     if script is None:
         meant = choose(settings, memory, observation, rates, streams[LEARNER])
-        proposed = move(motor, meant, last, actions, streams[LEARNER])
-        if not is_action(proposed, actions):
-            raise RequestError("the learner's action is not a whole number in [0, actions)")
+        done = move(motor, meant, last, actions, streams[LEARNER])
+        proposed = proposal_of(done, actions)
         noise = Noise(draw(streams[ASSISTANT]), draw(streams[ASSISTANT]))
     else:
         proposed, noise = script[0], Noise(script[1], script[2])
@@ -266,7 +264,5 @@ def preferred(common: Any, observation: np.ndarray, reward: float, last: int, ov
         return 0
     stream = streams[EVALUATION]
     meant = prefer(settings, memory, read_only(observation), draw(stream))
-    done = move(motor, meant, last, len(assistance.row), stream)
-    if not is_action(done, len(assistance.row)):
-        raise RequestError("the learner's action is not a whole number in [0, actions)")
-    return done
+    actions = len(assistance.row)
+    return proposal_of(move(motor, meant, last, actions, stream), actions)

@@ -19,12 +19,11 @@ from qbumpers.decisions import (
     Step,
     begin,
     execution_of,
-    is_action,
+    proposal_of,
     settle,
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError
 from qbumpers.learners.dispatch import begin as begin_learner
 from qbumpers.learners.dispatch import choose, forget, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
@@ -146,11 +145,9 @@ def _propose(
     """What the learner proposes, and the assistant's noise; or what a script says."""
     if script is None:
         meant = choose(learner.settings, memory, state, rates, streams[LEARNER])
-        proposed = move(learner.motor, meant, last, actions, streams[LEARNER])
-        if not is_action(proposed, actions):
-            raise RequestError("the learner's action is not a whole number in [0, actions)")
+        done = move(learner.motor, meant, last, actions, streams[LEARNER])
         noise = streams[ASSISTANT]
-        return int(proposed), Noise(draw(noise), draw(noise))
+        return proposal_of(done, actions), Noise(draw(noise), draw(noise))
     return script.proposed[recorded], Noise(script.coin[recorded], script.tie[recorded])
 
 
@@ -240,9 +237,8 @@ def _greedy_episode(
     total, events, length, last = 0.0, 0, 0, -1
     while length < dynamics.episode_limit:
         meant = prefer(learner.settings, memory, state, draw(stream))
-        last = move(learner.motor, meant, last, dynamics.actions, stream)
-        if not is_action(last, dynamics.actions):
-            raise RequestError("the learner's action is not a whole number in [0, actions)")
+        done = move(learner.motor, meant, last, dynamics.actions, stream)
+        last = proposal_of(done, dynamics.actions)
         _count_unassisted(sinks.counts, state, when.assisted)
         index = transition(dynamics, state, last, _chance(dynamics.outcomes, stream))
         total += dynamics.reward[index]

@@ -27,6 +27,7 @@ class _Outcome(NamedTuple):
     probability: float
 
     def is_like(self, next_state: int, reward: float, terminated: bool) -> bool:
+        """Whether this is what a step led to; rewards may differ by rounding."""
         return (
             self.next_state == next_state
             and self.terminated == terminated

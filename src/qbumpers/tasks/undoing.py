@@ -7,17 +7,12 @@ import gymnasium
 from gymnasium import wrappers
 
 from qbumpers.errors import RequestError
-from qbumpers.tasks.wrapping import layers
+from qbumpers.tasks.wrapping import WATCHING, layers
 
 # Nothing that they keep decides what later steps give, or it counts the step, which has happened.
 # Classes derived from these may keep something of their own, so each is named.
 _HARMLESS = {
-    wrappers.PassiveEnvChecker,
-    wrappers.OrderEnforcing,
-    wrappers.TimeLimit,
-    wrappers.RecordEpisodeStatistics,
-    wrappers.RecordVideo,
-    wrappers.HumanRendering,
+    *WATCHING,
     wrappers.TransformObservation,
     wrappers.AddRenderObservation,
     wrappers.DiscretizeObservation,

@@ -8,15 +8,17 @@ from gymnasium import wrappers
 
 from qbumpers.errors import RequestError
 
-_HARMLESS = (
+WATCHING = {
     wrappers.PassiveEnvChecker,
     wrappers.OrderEnforcing,
     wrappers.TimeLimit,
     wrappers.RecordEpisodeStatistics,
     wrappers.RecordVideo,
-    wrappers.RenderCollection,
     wrappers.HumanRendering,
-)
+}
+"""Wrappers that leave steps as they are, and go on whether or not a step is taken back."""
+
+_HARMLESS = {*WATCHING, wrappers.RenderCollection}
 _HARMLESS_ELSEWHERE = ("stable_baselines3.common.monitor.Monitor",)
 
 _OF_REWARDS = (wrappers.TransformReward, wrappers.ClipReward)
@@ -86,6 +88,7 @@ def followed_reward(environment: Any, name: str) -> Callable[[float], float]:
             )
 
     def followed(reward: float) -> float:
+        """What the wrappers make of a reward of the table."""
         changed = reward
         for layer in reversed(altering):
             try:
