@@ -13,7 +13,7 @@ from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
-from qbumpers.experiments.store import EPISODES
+from qbumpers.experiments.tables import EPISODES
 from qbumpers.files import open_folder
 from qbumpers.reproduction import report as reproduction_report
 from qbumpers.reproduction.experiments import reproduction

@@ -12,7 +12,8 @@ import pytest
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells, work
 from qbumpers.experiments.plan import make_plan
-from qbumpers.experiments.store import load, open_store
+from qbumpers.experiments.store import load
+from qbumpers.experiments.writing import open_store
 from qbumpers.files import LocalFolder, StoreError
 from tests.experiments.examples import BUMPERS, cells_of, contents_of, rows_of, run_into
 

@@ -10,7 +10,8 @@ from qbumpers.errors import RequestError
 from qbumpers.experiments import cells, work
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import make_experiment
-from qbumpers.experiments.store import load, open_store, run_description
+from qbumpers.experiments.store import load, run_description
+from qbumpers.experiments.writing import open_store
 from qbumpers.files import StoreError
 from tests.experiments.examples import cells_of, contents_of, run_into, settings
 from tests.narrowing import present

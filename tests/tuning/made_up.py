@@ -5,7 +5,7 @@ import polars as pl
 
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import make_experiment
-from qbumpers.experiments.store import EPISODES, STATES, encoded
+from qbumpers.experiments.tables import EPISODES, STATES, encoded
 from qbumpers.experiments.work import Finished
 from qbumpers.tuning import tune
 from tests.experiments.examples import settings

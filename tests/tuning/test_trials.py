@@ -10,7 +10,7 @@ from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
-from qbumpers.experiments.store import EPISODES
+from qbumpers.experiments.tables import EPISODES
 from qbumpers.tuning import tune
 from qbumpers.tuning.trials import gaps, trial_returns
 from tests.experiments.examples import cells_of, settings

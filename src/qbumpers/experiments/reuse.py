@@ -5,6 +5,7 @@ made them. Cells of another identity stay where they are: they are used again if
 again what it was.
 """
 
+import hashlib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -75,6 +76,17 @@ def usable_for(wanted: str, identity: str, record: Record) -> bool:
         record: of the conditions.
     """
     return record.allows_unmarked(wanted) if not identity else identity == wanted
+
+
+def digest_of(content: bytes) -> str:
+    """The digest of a table's bytes, of which its name tells."""
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def whole_content(folder: Folder, file: CellFile) -> bytes | None:
+    """What the file of a cell holds; None if it is damaged."""
+    content = folder.read(file.name) or b""
+    return content if digest_of(content) == file.digest else None
 
 
 def whole_cells(files: Iterable[CellFile], tables: Collection[str]) -> list[Cell]:

@@ -8,8 +8,8 @@ from typing import NamedTuple, Protocol
 from qbumpers.experiments.cells import Cell, tiles
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan, estimated_seconds
-from qbumpers.experiments.store import open_store
 from qbumpers.experiments.work import Finished
+from qbumpers.experiments.writing import open_store
 
 
 class Backend(Protocol):

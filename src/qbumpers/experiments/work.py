@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 
 from qbumpers.experiments.cells import Cell
-from qbumpers.experiments.store import EPISODES, STATES, encoded
+from qbumpers.experiments.tables import EPISODES, STATES, encoded
 from qbumpers.simulation import Condition, Simulation, StateCounts
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import Task

@@ -31,7 +31,7 @@ from qbumpers.experiments.design import NamedCondition
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.run import Backend
-from qbumpers.experiments.store import open_store
+from qbumpers.experiments.writing import open_store
 from qbumpers.files import open_folder
 from qbumpers.tuning.race import CHOSEN, UNCONFIRMED, Race, quiet
 from qbumpers.tuning.trials import Trials, TuningProgress

@@ -10,7 +10,8 @@ import polars as pl
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan, estimated_seconds
 from qbumpers.experiments.run import Backend
-from qbumpers.experiments.store import EPISODES, Store
+from qbumpers.experiments.tables import EPISODES
+from qbumpers.experiments.writing import Store
 
 
 class TuningProgress(NamedTuple):
