@@ -19,6 +19,24 @@ def test_an_action_space_without_numbered_actions_is_refused():
         SharedControl(pendulum, "none", CLIFF)
 
 
+@pytest.mark.parametrize("values", [np.zeros((48, 4)), {36: [0.0] * 4}, None, 3])
+def test_values_that_cannot_be_called_are_refused(values):
+    with pytest.raises(RequestError, match=r"values = .*; a callable from an observation to one"):
+        SharedControl(gymnasium.make("qbumpers/CliffWalking-v0"), "none", values, discount=0.9)
+
+
+@pytest.mark.parametrize("environment", ["Taxi-v4", "CartPole-v1"])
+def test_a_table_of_another_environment_is_named(environment):
+    env = SharedControl(gymnasium.make(environment), "none", CLIFF)
+    with pytest.raises(RequestError, match=r"values of cliff-walking: a table of 48 states has no"):
+        env.reset(seed=0)
+
+
+def test_a_discount_that_is_no_number_is_refused():
+    with pytest.raises(RequestError, match=r"discount = 'high'; a number in \(0, 1\] is needed"):
+        walking("none", values=lambda state: [0.0] * 4, discount="high")
+
+
 def test_an_unknown_assistant_names_the_nearest():
     with pytest.raises(RequestError, match=r"assistant 'maximum'.*did you mean 'maximal'"):
         walking("maximum")

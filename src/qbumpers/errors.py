@@ -1,6 +1,7 @@
 """Errors that a user can mend: each names the field, the value and what is allowed."""
 
 import difflib
+import numbers
 import operator
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -29,6 +30,27 @@ def whole_number(value: Any, where: str, allowed: str) -> int:
         return operator.index(value)
     except TypeError as error:
         raise RequestError(f"{where} = {value!r}; a whole number {allowed} is needed") from error
+
+
+def in_short(value: Any) -> str:
+    """A value as messages show it: in one line that is not long."""
+    shown = " ".join(repr(value).split())
+    return shown if len(shown) <= 80 else f"{shown[:77]}..."
+
+
+def check_number(value: Any, where: str, allowed: str) -> None:
+    """Check that something is a number at all, before it is compared.
+
+    Args:
+        value: an int, a float or one of NumPy's numbers; a text is none.
+        where: for the message, for instance "discount".
+        allowed: for the message, for instance "in (0, 1]".
+
+    Raises:
+        RequestError: if it is none.
+    """
+    if not isinstance(value, numbers.Real):
+        raise RequestError(f"{where} = {value!r}; a number {allowed} is needed")
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:

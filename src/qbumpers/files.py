@@ -150,6 +150,8 @@ class LocalFolder:
             return (self._path / name).read_bytes()
         except FileNotFoundError:
             return None
+        except NotADirectoryError as error:
+            raise RequestError(f"folder {self._path}: it is a file") from error
         except OSError as error:
             message = f"cannot read {self._path / name}: {error.strerror or error}"
             raise StoreError(message) from error

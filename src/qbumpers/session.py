@@ -32,7 +32,7 @@ from qbumpers.errors import RequestError, whole_number
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
-from qbumpers.values import QValues, check_width
+from qbumpers.values import QValues, check_callable, check_width
 from qbumpers.values.others import further_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
@@ -74,6 +74,7 @@ class Session:
         model: Model,
         perceived: Perception | str = "transition",
     ) -> None:
+        check_callable(values)
         self.assistant, self.values, self.model = assistant, values, model
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)

@@ -10,7 +10,7 @@ from gymnasium.utils import RecordConstructorArgs
 from qbumpers.assistants import Assistant, make_assistant
 from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model, Noise, Step
-from qbumpers.errors import RequestError, whole_number
+from qbumpers.errors import RequestError, check_number, whole_number
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
@@ -248,6 +248,7 @@ def _discount_of(values: Any, discount: float | None) -> float:
             "discount is missing: the values state none; give the one they were made with, in "
             "(0, 1]"
         )
+    check_number(chosen, "discount", "in (0, 1]")
     if not 0 < chosen <= 1:
         raise RequestError(f"discount = {chosen!r}; it must lie in (0, 1]")
     return float(chosen)

@@ -223,7 +223,7 @@ def registered(name: str) -> Rule:
     Raises:
         RequestError: if there is none.
     """
-    if name not in _rules:
+    if str(name) not in _rules:
         raise unknown_name("assistant", name, _rules)
     return _rules[name]
 

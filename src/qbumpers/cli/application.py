@@ -13,7 +13,13 @@ from rich.text import Text
 from typer.core import TyperGroup
 
 import qbumpers
-from qbumpers.cli.console import ERRORS, OUTPUT, print_in_any_encoding, print_warning
+from qbumpers.cli.console import (
+    ERRORS,
+    OUTPUT,
+    in_one_line,
+    print_in_any_encoding,
+    print_warning,
+)
 from qbumpers.errors import RequestError
 
 
@@ -65,7 +71,7 @@ def main() -> None:
     except Exception as error:
         if "--traceback" in sys.argv:
             raise
-        reason = f"{type(error).__name__}: {error}"
+        reason = f"{type(error).__name__}: {in_one_line(error)}"
         _stop(1, "failed", f"{reason} (unexpected; 'qbumpers --traceback ...' shows where)")
 
 

@@ -45,7 +45,12 @@ def print_in_any_encoding() -> None:
 
 def print_warning(message: Warning | str, *_: Any) -> None:
     """A warning in one line; in place of `warnings.showwarning`."""
-    ERRORS.print(f"warning: {escape(str(message))}", soft_wrap=True)
+    ERRORS.print(f"warning: {escape(in_one_line(message))}", soft_wrap=True)
+
+
+def in_one_line(message: object) -> str:
+    """A message without line breaks: those of libraries often have some."""
+    return " ".join(str(message).split())
 
 
 @contextlib.contextmanager

@@ -110,6 +110,11 @@ def expert(
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     _check_conversion(made, check, convert, statistics)
     path = out or Path(f"{task.replace('/', '-')}.npz")
+    for option, place in {"--out": out, "--corrected": corrected}.items():
+        if place is not None:
+            _check_place(option, place)
+    if figures is not None:
+        _check_place("--figures", figures / "any")
     with stoppable():
         if made.states:
             if corrected is not None:
@@ -163,6 +168,15 @@ def _convert(task: "Task", model: Path, statistics: Path | None, path: Path) -> 
         f"{found.random.mean:.1f}\nValues: [bold]{escape(str(path))}[/bold]",
         soft_wrap=True,
     )
+
+
+def _check_place(option: str, path: Path) -> None:
+    """Refuse a place where no file can be, before hours of work for it."""
+    if path.is_dir():
+        raise RequestError(f"{option} {path}: it is a folder; a file is needed")
+    for folder in path.parents:
+        if folder.exists() and not folder.is_dir():
+            raise RequestError(f"{option}: {folder} is a file; a folder is needed")
 
 
 def _hidden(text: str) -> list[int]:

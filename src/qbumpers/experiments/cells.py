@@ -9,6 +9,9 @@ EPISODES_A_CELL = 50_000
 MANY_CELLS = 10_000
 """More cells of work than this are not begun unless they are asked for."""
 
+MOST_CELLS = 1_000_000
+"""More cells of work than this, each some files, are never begun."""
+
 
 class Cell(NamedTuple):
     """A block of trials of one condition.

@@ -216,7 +216,7 @@ def _all_learners(given: list[Any], task: Any) -> list[Any]:
 
 def learner_observes(name: Any) -> str:
     """What a kind of learner observes; "states" if there is none of the name."""
-    return learners()[name].observes if name in learners() else "states"
+    return learners()[name].observes if str(name) in learners() else "states"
 
 
 def _learner_name(task: Any) -> str:

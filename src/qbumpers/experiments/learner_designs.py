@@ -113,7 +113,7 @@ def design_class(name: str) -> type[LearnerDesign]:
     Raises:
         RequestError: if there is none of that name.
     """
-    if name not in learners():
+    if str(name) not in learners():
         raise unknown_name("learners.name", name, learners())
     return _design_of(learner_type(name).settings_type, name)
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from qbumpers.errors import RequestError, from_validation
-from qbumpers.experiments.cells import MANY_CELLS
+from qbumpers.experiments.cells import MANY_CELLS, MOST_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign
 from qbumpers.experiments.learner_designs import RECORDED, field_names
 
@@ -53,10 +53,11 @@ def make_experiment(
     except ValidationError as error:
         raise from_validation(error, where, _field_names()) from error
     cells = experiment.condition_count() * math.ceil(experiment.trials / experiment.trials_a_cell())
-    if cells > MANY_CELLS and not large:
+    if cells > (MOST_CELLS if large else MANY_CELLS):
+        refused = "is too many" if large else "must be asked for with --yes"
         raise RequestError(
             f"{where}: {experiment.condition_count():,} conditions, together {cells:,} cells of "
-            f"work; more than {MANY_CELLS:,} must be asked for with --yes"
+            f"work; more than {MOST_CELLS if large else MANY_CELLS:,} {refused}"
         )
     try:
         experiment.conditions()

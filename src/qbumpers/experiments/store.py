@@ -10,6 +10,7 @@ import polars as pl
 
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell, tiles
+from qbumpers.experiments.columns import EPISODE_COLUMNS, STATE_COLUMNS, check_columns
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.record import (
     CONDITIONS,
@@ -26,6 +27,8 @@ from qbumpers.values import NetworkValues, TabularValues, decoded_values
 
 EXPERIMENT, VALUES = "experiment.toml", "values.npz"
 """Files of an output folder; design and platform, and Q*."""
+
+_COLUMNS = {EPISODES: EPISODE_COLUMNS, STATES: STATE_COLUMNS}
 
 NEEDED = (EXPERIMENT, CONDITIONS, EPISODES, STATES, VALUES)
 """What the analysis reads."""
@@ -91,7 +94,14 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
             f"results folder {folder}: the run is not finished; run it again to continue"
         )
     conditions = conditions_of(folder, experiment, tables[EPISODES])
-    values = decoded_values(place.read(VALUES) or b"", f"{folder}/{VALUES}")
+    kept = place.read(VALUES)
+    if kept is None:
+        raise RequestError(
+            f"results folder {folder}: the run is not finished; run it again to continue"
+        )
+    values = decoded_values(kept, f"{folder}/{VALUES}")
+    if experiment.tabular and not isinstance(values, TabularValues):
+        raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
     return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
 
 
@@ -106,6 +116,8 @@ def _whole_tables(folder: Folder, experiment: Experiment) -> dict[str, pl.DataFr
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
         ) from error
+    for name, table in tables.items():
+        check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
     ids = {each.condition for each in conditions_of(str(folder), experiment, episodes)}
     rows = len(ids) * experiment.trials * (experiment.episodes + experiment.retention)
@@ -188,8 +200,11 @@ def read_design(folder: Folder) -> Experiment | None:
     content = folder.read(EXPERIMENT)
     if content is None:
         return None
-    settings = parsed(content, f"experiment file {folder}/{EXPERIMENT}")
-    found = settings.get("run", {}).get("format", 1)
+    where = f"experiment file {folder}/{EXPERIMENT}"
+    settings = parsed(content, where)
+    if not isinstance(settings.get("run"), dict):
+        raise RequestError(f"{where}: it has no table [run]; is it the one that a run wrote?")
+    found = settings["run"].get("format", 1)
     if found not in _READ:
         age = "a newer" if isinstance(found, int) and found > FORMAT else "an older"
         raise RequestError(
@@ -197,7 +212,7 @@ def read_design(folder: Folder) -> Experiment | None:
             f"needed {FORMAT}); choose another folder"
         )
     del settings["run"]
-    return recorded_experiment(settings, f"experiment file {folder}/{EXPERIMENT}")
+    return recorded_experiment(settings, where)
 
 
 def kept_files(folder: str | Path, each: RecordedCondition) -> dict[str, np.ndarray]:

@@ -57,7 +57,7 @@ def perception(name: str) -> Perception:
     Raises:
         RequestError: if there is none.
     """
-    if name not in PERCEPTIONS:
+    if str(name) not in PERCEPTIONS:
         raise unknown_name("perception", name, PERCEPTIONS)
     return PERCEPTIONS[name]
 

@@ -190,7 +190,7 @@ def learner_type(name: str) -> LearnerType:
     Raises:
         RequestError: if there is none.
     """
-    if name not in _learners:
+    if str(name) not in _learners:
         raise unknown_name("learner", name, _learners)
     return _learners[name]
 

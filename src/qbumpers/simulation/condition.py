@@ -1,7 +1,6 @@
 """What a trial needs, checked before any of it runs."""
 
 import hashlib
-import json
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypedDict, Unpack
 
@@ -10,16 +9,29 @@ import numpy as np
 from qbumpers.assistants import Assistant, assistant_of
 from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model
-from qbumpers.errors import RequestError, checked, unknown_name
-from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings, learner_type
+from qbumpers.errors import (
+    RequestError,
+    check_number,
+    checked,
+    unknown_name,
+    whole_number,
+)
+from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
 from qbumpers.registration import as_numbers, files_from, files_in
+from qbumpers.simulation.checking import (
+    check_kept,
+    checked_learner,
+    checked_motor,
+    checked_values,
+    plain,
+)
 from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
-from qbumpers.values import NetworkValues, QValues, check_width, solve
-from qbumpers.values.others import further_values
+from qbumpers.tasks.task import check_task
+from qbumpers.values import NetworkValues, QValues
 
 _FIRST_LEARNERS = ("q-learning", "double-dqn")  # what these seed does not name them
 
@@ -142,7 +154,7 @@ class Condition(NamedTuple):
             "learner name": ""
             if self.learner_type.name in _FIRST_LEARNERS
             else self.learner_type.name,
-            "motor": _plain(self.motor) if self.motor != Motor() else None,
+            "motor": plain(self.motor) if self.motor != Motor() else None,
             "forgetting": self.forgetting,
             "others": _digest(self.others) if self.assistant.values else "",
             "files": [*_file_digests(self.assistant), *map(_digest, self.files.values())],
@@ -153,8 +165,8 @@ class Condition(NamedTuple):
             "discount": self.discount,
             "assistant": self.assistant.name,
             "options": self.assistant.described(),
-            "learner": {**_plain(self.learner), "penalty": self.penalty},
-            "perception": self.perception if named else _plain(self.perception),
+            "learner": {**plain(self.learner), "penalty": self.penalty},
+            "perception": self.perception if named else plain(self.perception),
             "episodes": self.episodes,
             **{name: part for name, part in added.items() if part},
         }
@@ -182,13 +194,6 @@ def _file_digests(assistant: Assistant) -> list[str]:
     return own + (_file_digests(assistant.of) if assistant.of else [])
 
 
-def _plain(settings: Any) -> Any:
-    """NamedTuples within NamedTuples as dictionaries."""
-    if hasattr(settings, "_asdict"):
-        return {field: _plain(value) for field, value in settings._asdict().items()}
-    return settings
-
-
 def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup]) -> Condition:
     """Check everything that a simulation needs, before any of it runs.
 
@@ -208,9 +213,10 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
     for name in setup:
         if name not in Setup.__annotations__:
             raise unknown_name("setting", name, Setup.__annotations__)
+    check_task(task)
     helper = assistant_of(assistant, "assistant")
     helper.check_task(task.name, _has(task))
-    found = _checked_values(task, helper, setup.get("values"))
+    found = checked_values(task, helper, setup.get("values"))
     perception = setup.get("perception", "transition")
     if isinstance(perception, Perception):
         perception = checked(Perception, perception._asdict(), "perception")
@@ -220,34 +226,24 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
         task,
         *found,
         helper,
-        _checked_learner(task, setup.get("learner")),
+        checked_learner(task, setup.get("learner")),
         perception,
         setup.get("penalty", 1.0),
-        checked(Motor, setup.get("motor", Motor())._asdict(), "motor"),
+        checked_motor(setup.get("motor", Motor())),
         setup.get("forgetting", 0.0),
-        setup.get("episodes", 100),
-        setup.get("retention", 0),
+        whole_number(setup.get("episodes", 100), "episodes", "from 1 up"),
+        whole_number(setup.get("retention", 0), "retention", "from 0 up"),
         setup.get("common_random_numbers", False),
     )
     _check_numbers(condition)
-    _check_kept(f"options of assistant {helper.name}", helper.described())
-    _check_kept(f"learner {condition.learner_type.name}", _plain(condition.learner))
+    check_kept(f"options of assistant {helper.name}", helper.described())
+    check_kept(f"learner {condition.learner_type.name}", plain(condition.learner))
     return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
 
 
-def _check_kept(where: str, settings: dict[str, Any]) -> None:
-    """Check that settings can be written: they name results and seed random streams."""
-    for field, value in settings.items():
-        try:
-            json.dumps(value)
-        except (TypeError, ValueError) as error:
-            raise RequestError(
-                f"{where}: {field} = {value!r}; only numbers, texts, lists and tables of them, and "
-                "Files of numbers, can be kept with results"
-            ) from error
-
-
 def _check_numbers(condition: Condition) -> None:
+    check_number(condition.penalty, "penalty", "of reward units")
+    check_number(condition.forgetting, "forgetting", "in [0, 1]")
     if condition.episodes < 1:
         raise RequestError(f"episodes = {condition.episodes!r}; at least 1 is needed")
     if condition.retention < 0:
@@ -270,66 +266,6 @@ def _has(task: Task) -> dict[str, bool]:
         "undo": task.undoable,
         "no_op": task.no_op >= 0,
     }
-
-
-def _checked_values(
-    task: Task, assistant: Assistant, values: QValues | None
-) -> tuple[Any, Any, float]:
-    """Q* as a condition keeps it, the further rows, and the discount."""
-    if not task.states:
-        return _checked_network(task, assistant, values)
-    source: Any = solve(task) if values is None else values
-    table = _table(task, source, "")
-    others = np.zeros((task.states, len(assistant.values), task.actions))
-    for place, name in enumerate(assistant.values):
-        others[:, place] = _table(task, further_values(source, name, assistant.name), f" {name!r}")
-    for state in np.flatnonzero(task.start):
-        assistant.check_start(float(table[state].max()))
-    return table, others, float(getattr(source, "discount", task.discount))
-
-
-def _table(task: Task, source: Any, name: str) -> np.ndarray:
-    """Values of every state, float64 [S, A]; those of what the assistant sees of it."""
-    seen = range(task.states) if task.seen is None else task.seen
-    return np.stack(
-        [
-            check_width(source(int(number)), task.actions, f"{name} in state {state}".strip())
-            for state, number in enumerate(seen)
-        ]
-    )
-
-
-def _checked_network(
-    task: Task, assistant: Assistant, values: QValues | None
-) -> tuple[Any, Any, float]:
-    if not isinstance(values, NetworkValues):
-        raise RequestError(
-            f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
-            "values, for instance of load_values or train_expert"
-        )
-    found = (values.inputs, values.actions)
-    if found != (task.observation_size, task.actions):
-        raise RequestError(
-            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
-            f"{task.name} needs {task.observation_size} and {task.actions}"
-        )
-    # They have the shape of Q*, or there would be no such values.
-    others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    return values, others, values.discount
-
-
-def _checked_learner(task: Task, settings: Any) -> Any:
-    if settings is None:
-        kind = learner_type(task.learners[0]).settings_type
-        return kind(discount=task.discount)
-    learner = learner_for_settings(type(settings))
-    if (learner.observes == "states") != (task.states > 0):
-        needed = "numbered states" if task.states else "vectors"
-        raise RequestError(
-            f"learner = {settings!r}; it observes {learner.observes}, and task {task.name} has "
-            f"{needed}, as have the learners {', '.join(task.learners)}"
-        )
-    return checked(type(settings), _plain(settings), "learner")
 
 
 def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | None, float | None]:

@@ -9,7 +9,7 @@ import numpy as np
 from qbumpers.assistants import Assistant
 from qbumpers.compilation import compiling_together
 from qbumpers.decisions import Step
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, whole_number
 from qbumpers.simulation import deep, tabular
 from qbumpers.simulation.condition import Condition, Setup, make_condition
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
@@ -56,6 +56,7 @@ def run(
 ) -> Simulation:
     """Simulate a condition; `simulate` says what the arguments mean."""
     which = _checked_trials(trials, seed)
+    workers = whole_number(workers, "workers", "from 1 up")
     if workers < 1:
         raise RequestError(f"workers = {workers!r}; at least 1 is needed")
     ends = np.linspace(0, len(which), min(workers, len(which)) + 1).astype(int).tolist()

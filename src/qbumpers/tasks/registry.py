@@ -63,11 +63,11 @@ def make_task(
     Raises:
         RequestError: if no task or environment has the name, or an argument does not suit it.
     """
-    if name in _tasks:
+    if str(name) in _tasks:
         numbers = {"discount": discount, "episode_limit": episode_limit}
         given = {field: value for field, value in numbers.items() if value is not None}
         return _registered(name, {**given, **arguments})
-    if name not in gymnasium.registry:
+    if str(name) not in gymnasium.registry:
         known = [*_tasks, *tabular_environments(), *vector_environments()]
         raise unknown_name("task", name, known)
     if discount is None:

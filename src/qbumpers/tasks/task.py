@@ -5,8 +5,19 @@ from typing import Any, Protocol
 import gymnasium
 import numpy as np
 
+from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import Dynamics
 from qbumpers.tasks.stepping import Stepper
+
+
+def check_task(task: Any) -> None:
+    """Check that a task is not merely named.
+
+    Raises:
+        RequestError: if it is.
+    """
+    if task is None or isinstance(task, str):
+        raise RequestError(f"task = {task!r}; a task is needed, for instance of make_task(name)")
 
 
 class Task(Protocol):

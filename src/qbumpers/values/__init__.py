@@ -4,12 +4,20 @@ from qbumpers.values.exact import solve
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.q_learning import learn_values
 from qbumpers.values.shipped import shipped_expert
-from qbumpers.values.tabular import QValues, TabularValues, check_width, decoded_values, load_values
+from qbumpers.values.tabular import (
+    QValues,
+    TabularValues,
+    check_callable,
+    check_width,
+    decoded_values,
+    load_values,
+)
 
 __all__ = [
     "NetworkValues",
     "QValues",
     "TabularValues",
+    "check_callable",
     "check_width",
     "decoded_values",
     "learn_values",

@@ -10,6 +10,7 @@ import numpy as np
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks.task import check_task
 from qbumpers.values.tabular import TabularValues
 
 DECIMALS = 9
@@ -35,6 +36,7 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
         RequestError: if the task has no table of transitions, the discount is out of range, or
             is 1 and a reachable state has no proper policy, or values grow without bound.
     """
+    check_task(task)
     if "exact" not in task.value_sources:
         raise RequestError(
             f"task {task.name} has no table of transitions to be solved: its values are learned, "

@@ -14,7 +14,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 import qbumpers
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 from qbumpers.files import write_atomically
 from qbumpers.values.network import NetworkValues, network_values
 from qbumpers.values.others import (
@@ -70,7 +70,7 @@ class TabularValues:
 
     def __post_init__(self) -> None:
         """Check the table and freeze it."""
-        table = np.array(self.table, np.float64)
+        table = _numbers(self.table, f"values of {self.task}: table")
         if table.ndim != 2:
             raise RequestError(
                 f"values of {self.task}: table has shape {table.shape}; [S, A] is needed"
@@ -98,7 +98,13 @@ class TabularValues:
 
     def __call__(self, observation: Any, /) -> np.ndarray:
         """Q*(s, .) as float64 [A]; the observation is the number of the state."""
-        return self.table[observation]
+        try:
+            return self.table[observation]
+        except IndexError as error:
+            raise RequestError(
+                f"values of {self.task}: a table of {len(self.table)} states has no row for the "
+                f"observation {in_short(observation)}"
+            ) from error
 
     def digest(self) -> str:
         """A SHA-256 of tables and discounts: equal for values that decide alike."""
@@ -157,8 +163,8 @@ def load_values(path: str | Path) -> TabularValues | NetworkValues:
         content = Path(path).read_bytes()
     except FileNotFoundError as error:
         raise RequestError(f"values file {path}: there is none") from error
-    except OSError as error:
-        reason = error.strerror or error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
         raise RequestError(f"values file {path}: not a file of Q values ({reason})") from error
     return decoded_values(content, str(path))
 
@@ -200,6 +206,8 @@ def _reason(content: bytes, version: str, error: Exception) -> str:
     """Why a file cannot be read."""
     if version not in ("", qbumpers.__version__):
         return f"written by qbumpers {version}, and this is {qbumpers.__version__} ({error})"
+    if not content.startswith(b"PK"):
+        return f"not a file of Q values ({'no archive of NumPy' if content else 'it is empty'})"
     if b"_stable_baselines3_version" in content:
         return (
             "a model of Stable-Baselines3; convert it by qbumpers.experts.from_stable_baselines "
@@ -229,6 +237,26 @@ def _values(
     return network_values(arrays, provenance)
 
 
+def _numbers(given: Any, what: str) -> np.ndarray:
+    try:
+        return np.array(given, np.float64)
+    except (TypeError, ValueError) as error:
+        raise RequestError(f"{what} = {in_short(given)}; an array of numbers is needed") from error
+
+
+def check_callable(values: Any) -> None:
+    """Check that values are what they must be, a callable.
+
+    Raises:
+        RequestError: if they are not.
+    """
+    if not callable(values):
+        raise RequestError(
+            f"values = {in_short(values)}; a callable from an observation to one value per action "
+            "is needed, for instance TabularValues or what load_values reads"
+        )
+
+
 def check_width(values: Any, actions: int, where: str) -> np.ndarray:
     """One row of action values, checked.
 
@@ -243,7 +271,7 @@ def check_width(values: Any, actions: int, where: str) -> np.ndarray:
     Raises:
         RequestError: if the width is wrong or a value is not finite.
     """
-    row = np.array(values, np.float64)
+    row = _numbers(values, f"Q values {where}")
     if row.shape != (actions,):
         raise RequestError(
             f"Q values {where} have shape {row.shape}; one value per action, ({actions},), is "

@@ -1,6 +1,7 @@
 """What figures have in common, and how they are saved."""
 
 import re
+from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib as mpl
@@ -26,6 +27,19 @@ def drawn():
         axes.plot([0, 1], [2, 5])
         axes.set(xlabel="episode", ylabel="return")
     return drawing
+
+
+def test_a_figure_looks_the_same_whatever_the_settings_of_a_notebook(tmp_path):
+    plain = save(drawn(), tmp_path / "plain", "curve").read_bytes()
+    hostile: dict[Any, Any] = {
+        "text.usetex": True, "axes.facecolor": "black", "savefig.bbox": "tight", "font.size": 30,
+        "font.family": "monospace", "path.sketch": (1, 100, 2), "lines.linewidth": 9,
+        "figure.autolayout": True, "axes.unicode_minus": False,
+    }  # fmt: skip
+    with mpl.rc_context(hostile):
+        settings = dict(mpl.rcParams)
+        assert save(drawn(), tmp_path / "hostile", "curve").read_bytes() == plain
+        assert dict(mpl.rcParams) == settings
 
 
 def test_a_saved_figure_is_a_png_of_the_right_size_and_an_svg(tmp_path):

@@ -1,0 +1,127 @@
+"""What is wrong with the parts of a condition, found before any of it runs."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from qbumpers.assistants import Assistant
+from qbumpers.errors import RequestError, checked, in_short
+from qbumpers.learners import Motor, learner_for_settings, learner_type
+from qbumpers.tasks import Task
+from qbumpers.values import NetworkValues, QValues, check_callable, check_width, solve
+from qbumpers.values.others import further_values
+
+
+def checked_values(
+    task: Task, assistant: Assistant, values: QValues | None
+) -> tuple[Any, Any, float]:
+    """Q* as a condition keeps it, the further rows, and the discount.
+
+    Args:
+        task: what is to be learned.
+        assistant: whose values they are.
+        values: None for the exact solution of a task with a table.
+
+    Raises:
+        RequestError: if they do not fit the task, or an episode could start in a state that does
+            not suit the assistant's options.
+    """
+    if not task.states:
+        return _checked_network(task, assistant, values)
+    source: Any = solve(task) if values is None else values
+    check_callable(source)
+    table = _table(task, source, "")
+    others = np.zeros((task.states, len(assistant.values), task.actions))
+    for place, name in enumerate(assistant.values):
+        others[:, place] = _table(task, further_values(source, name, assistant.name), f" {name!r}")
+    for state in np.flatnonzero(task.start):
+        assistant.check_start(float(table[state].max()))
+    return table, others, float(getattr(source, "discount", task.discount))
+
+
+def _table(task: Task, source: Any, name: str) -> np.ndarray:
+    """Values of every state, float64 [S, A]; those of what the assistant sees of it."""
+    seen = range(task.states) if task.seen is None else task.seen
+    return np.stack(
+        [
+            check_width(source(int(number)), task.actions, f"{name} in state {state}".strip())
+            for state, number in enumerate(seen)
+        ]
+    )
+
+
+def _checked_network(
+    task: Task, assistant: Assistant, values: QValues | None
+) -> tuple[Any, Any, float]:
+    if not isinstance(values, NetworkValues):
+        raise RequestError(
+            f"values = {in_short(values)}; task {task.name} cannot be solved exactly: give a "
+            "network's values, for instance of load_values or train_expert"
+        )
+    found = (values.inputs, values.actions)
+    if found != (task.observation_size, task.actions):
+        raise RequestError(
+            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
+            f"{task.name} needs {task.observation_size} and {task.actions}"
+        )
+    # They have the shape of Q*, or there would be no such values.
+    others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
+    return values, others, values.discount
+
+
+def checked_learner(task: Task, settings: Any) -> Any:
+    """Settings of a learner that suits a task; the paper's if `settings` is None.
+
+    Raises:
+        RequestError: if they are none, are out of range, or observe something else.
+    """
+    if settings is None:
+        kind = learner_type(task.learners[0]).settings_type
+        return kind(discount=task.discount)
+    learner = learner_for_settings(type(settings))
+    if (learner.observes == "states") != (task.states > 0):
+        needed = "numbered states" if task.states else "vectors"
+        raise RequestError(
+            f"learner = {settings!r}; it observes {learner.observes}, and task {task.name} has "
+            f"{needed}, as have the learners {', '.join(task.learners)}"
+        )
+    return checked(type(settings), plain(settings), "learner")
+
+
+def checked_motor(motor: Any) -> Motor:
+    """Motor noise with numbers in range.
+
+    Raises:
+        RequestError: if it is none, or a number is out of range.
+    """
+    if not isinstance(motor, Motor):
+        raise RequestError(f"motor = {in_short(motor)}; a Motor is needed, as Motor(slip=0.1)")
+    return checked(Motor, motor._asdict(), "motor")
+
+
+def check_kept(where: str, settings: dict[str, Any]) -> None:
+    """Check that settings can be written: they name results and seed random streams.
+
+    Args:
+        where: for messages, for instance "options of assistant guide".
+        settings: values by name.
+
+    Raises:
+        RequestError: if one of them is nothing that a text can hold.
+    """
+    for field, value in settings.items():
+        try:
+            json.dumps(value)
+        except (TypeError, ValueError) as error:
+            raise RequestError(
+                f"{where}: {field} = {value!r}; only numbers, texts, lists and tables of them, and "
+                "Files of numbers, can be kept with results"
+            ) from error
+
+
+def plain(settings: Any) -> Any:
+    """NamedTuples within NamedTuples as dictionaries."""
+    if hasattr(settings, "_asdict"):
+        return {field: plain(value) for field, value in settings._asdict().items()}
+    return settings
