@@ -89,16 +89,12 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
     if tables is None:
         record = decoded_record(place.read(CONDITIONS))
         tables = _tables_of_cells(place, experiment, record) if unfinished and record else None
-    if tables is None:
+    kept = place.read(VALUES)
+    if tables is None or kept is None:
         raise RequestError(
             f"results folder {folder}: the run is not finished; run it again to continue"
         )
     conditions = conditions_of(folder, experiment, tables[EPISODES])
-    kept = place.read(VALUES)
-    if kept is None:
-        raise RequestError(
-            f"results folder {folder}: the run is not finished; run it again to continue"
-        )
     values = decoded_values(kept, f"{folder}/{VALUES}")
     if experiment.tabular and not isinstance(values, TabularValues):
         raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
