@@ -194,7 +194,8 @@ def test_without_the_note_cells_are_known_by_their_names(own_files, tmp_path):
     own_files.register_rule()
     continued(tmp_path)
     shutil.copy(tmp_path / "conditions.json", tmp_path / "kept.json")
-    for content in (None, b"", b"{}", b"[1]", b"nonsense"):
+    lost = (tmp_path / "kept.json").read_bytes().replace(b'"identities"', b'"other"')
+    for content in (None, b"", b"{}", b"[1]", b"nonsense", b'{"conditions": 3}', lost):
         path = tmp_path / "conditions.json"
         path.unlink() if content is None else path.write_bytes(content)
         assert continued(tmp_path) == (4, {}, [])

@@ -1,5 +1,6 @@
 """Experts trained alike, judged by one rule, and not trained twice."""
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ from qbumpers.learners import DoubleDQN, Schedule
 from qbumpers.networks import Network
 from qbumpers.tasks import make_task
 from qbumpers.values import load_values
+from tests.experiments.own_files import OwnFiles
 from tests.values.networks import constant
 from tests.values.walking import DISCOUNT, line, worth
 
@@ -82,6 +84,34 @@ def test_another_recipe_or_task_is_another_training(tmp_path):
     train_several(line(), RECIPE._replace(steps=61), [0], tmp_path)
     train_several(line(episode_limit=7), RECIPE, [0], tmp_path)
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_other_code_of_an_own_environment_is_another_training(tmp_path, monkeypatch):
+    trained = []
+
+    def counted(task, recipe, *, seed, report):
+        trained.append(seed)
+        return constant(1, 1, 2, discount=DISCOUNT)
+
+    monkeypatch.setattr(choosing, "train_expert", counted)
+    (tmp_path / "own").mkdir()
+    files = OwnFiles(tmp_path / "own", monkeypatch)
+
+    def train():
+        trained.clear()
+        files.register_environment()
+        task = make_task("own/Walk-v0", discount=DISCOUNT)
+        train_several(task, RECIPE, [0], tmp_path / "kept")
+        return list(trained)
+
+    try:
+        assert [train(), train()] == [[0], []]
+        files.edit("own_environment", "-1.0, ended", "-2.0, ended")
+        assert [train(), train()] == [[0], []]
+        files.edit("own_environment", "-2.0, ended", "-1.0, ended")
+        assert train() == []
+    finally:
+        gymnasium.registry.pop("own/Walk-v0", None)
 
 
 def test_a_damaged_file_is_named(tmp_path):

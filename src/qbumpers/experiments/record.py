@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from qbumpers.assistants import Assistant
 from qbumpers.experiments.design import NamedCondition
@@ -89,12 +90,11 @@ def is_kept_file(name: str) -> bool:
 def decoded_record(content: bytes | None) -> Record | None:
     """A record from what `encoded` gave; None if there is none, or it is damaged."""
     try:
-        fields = json.loads(content or b"")
-        return Record(
-            **{**fields, "conditions": [RecordedCondition(**c) for c in fields["conditions"]]}
-        )
-    except (ValueError, TypeError, KeyError):
+        record = TypeAdapter(Record).validate_json(content or b"")
+    except ValidationError:
         return None
+    known = all(each.identity in record.identities for each in record.conditions)
+    return record if known else None
 
 
 def recorded(

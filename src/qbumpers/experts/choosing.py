@@ -1,10 +1,11 @@
 """Several experts trained alike, judged by a rule fixed beforehand, and the best of them kept."""
 
+import uuid
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from qbumpers.experts.checking import MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, discounted_return, play_several
 from qbumpers.experts.training import Recipe, train_expert
 from qbumpers.random_streams import content_digest
+from qbumpers.source import meaning_of
 from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import load_values
@@ -97,6 +99,9 @@ def train_several(
 ) -> list[NetworkValues]:
     """Train an expert with each of several seeds; finished ones are kept and not trained again.
 
+    Those of a task of a user's own are trained again if the code that steps it has changed, or
+    cannot be known.
+
     Args:
         task: what they are to be good at.
         recipe: how each of them is trained.
@@ -112,7 +117,7 @@ def train_several(
     """
     experts: list[NetworkValues] = []
     for seed in seeds:
-        content = content_digest([task.digest(), recipe.words(seed)]).hex()
+        content = content_digest([task.digest(), recipe.words(seed), *_own_code(task)]).hex()
         path = folder / f"seed-{seed}-{content[:12]}.npz"
         if not path.exists():
             train_expert(task, recipe, seed=seed, report=partial(report, seed)).save(path)
@@ -122,6 +127,15 @@ def train_several(
         experts.append(values)
         report(seed, recipe.steps)
     return experts
+
+
+def _own_code(task: Task) -> list[Any]:
+    """What code of a user's own steps a task means; other code than this is another training."""
+    meaning = meaning_of({"task": task.code})
+    if not meaning.modules:
+        return []
+    unknown = [uuid.uuid4().hex] if meaning.unknown else []
+    return [meaning.code, meaning.packages, *unknown]
 
 
 def with_provenance(
