@@ -303,6 +303,7 @@ def local_copy(location: str | Path, names: Iterable[str]) -> Iterator[Path]:
         for name in names:
             content = folder.read(name)
             if content is not None:
+                (copy / name).parent.mkdir(parents=True, exist_ok=True)
                 (copy / name).write_bytes(content)
         before = {path: path.stat().st_mtime_ns for path in copy.rglob("*")}
         yield copy

@@ -75,4 +75,4 @@ def number(value, digits=1):
 
 def interval(row, measure, digits=1):
     mean, low, high = (number(row[f"{measure}_{part}"], digits) for part in ("mean", "low", "high"))
-    return f"{mean} [{low}, {high}]"
+    return f"{mean} no interval" if low == "–" else f"{mean} [{low}, {high}]"

@@ -190,6 +190,21 @@ def test_advantages_are_differences_of_what_methods_cover():
         assert row["probability"] == float(expected > 0)
 
 
+def test_how_sure_comparisons_are_is_unknown_from_single_trials():
+    single = measured(trials=1)
+    best = optimal(single, np.random.default_rng(0))
+    assert best["probability"].null_count() == best.height
+    assert best["pareto"].any()
+    tables = compare_methods(single, np.random.default_rng(0))
+    for table, columns in (
+        (tables.methods, ["hypervolume_low", "hypervolume_high", "largest"]),
+        (tables.advantages, ["advantage_low", "advantage_high", "probability"]),
+    ):
+        assert table.height > 0
+        assert table.select(pl.col(columns).null_count()).row(0) == (table.height,) * 3
+    assert tables.methods["hypervolume_mean"].null_count() == 0
+
+
 def test_a_single_method_has_no_advantages():
     trials = measured().filter(assistant="stochastic-q-bumpers")
     found = compare_methods(trials, generator()).advantages

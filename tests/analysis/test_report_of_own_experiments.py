@@ -56,14 +56,37 @@ def test_a_single_episode_of_a_task_without_a_grid_is_reported(tmp_path):
     assert "alpha" not in row
     [cells] = page.rows("conditions")
     assert cells[:3] == ["none", interval(row, "assisted"), interval(row, "unassisted")]
-    assert cells[1].endswith("[–, –]")
+    assert cells[1].endswith(" no interval")
 
 
 def test_a_single_trial_of_a_sweep_is_reported(tmp_path):
-    page = reported(tmp_path, **PLAIN, trials=1)
-    assert len(page.rows("conditions")) == 3
-    assert "[–, –]" in page.rows("conditions")[0][1]
+    methods = [*PLAIN["assistants"], {"name": "local-q-thresholding", "alpha": [0.01, 0.5]}]
+    page = reported(tmp_path, **{**PLAIN, "assistants": methods}, trials=1)
+    assert len(page.rows("conditions")) == 5
     assert "There is one trial per condition: nothing here has an interval." in page.text
+    assert "so no number has an interval" in page.text
+    assert "in brackets" not in page.text
+    for path in [*tmp_path.glob("*.csv"), *(tmp_path / "figures").glob("*.csv")]:
+        table = pl.read_csv(path)
+        ends = [c for c in table.columns if c.endswith(("_low", "_high"))]
+        ends += [c for c in ("probability", "largest", "low", "high") if c in table.columns]
+        assert table.select(pl.col(ends).null_count()).row(0) == (table.height,) * len(ends), path
+        assert "nan" not in path.read_text(encoding="utf-8").lower()
+    assert not {"nan", "[–,", "nan%"} & set(page.text.lower().split())
+    for section in ("frontier", "methods", "control", "dependence", "conditions"):
+        cells = [
+            cell for number in range(9) for row in tables(page, section, number) for cell in row
+        ]
+        assert any(cell.endswith("no interval") for cell in cells), section
+    for caption, _ in page.pictures:
+        assert caption.endswith(
+            "There is one trial per condition, which has no interval: none is drawn."
+        ) == ("grid cell" not in caption)
+
+
+def tables(page, section, number):
+    found = page.tables.get(section, [])
+    return found[number][1:] if number < len(found) else []
 
 
 def test_maximal_assistance_alone_is_reported(tmp_path):

@@ -200,3 +200,22 @@ def test_stratified_intervals_of_the_interquartile_mean_cover_the_truth(repetiti
     covered = np.mean([estimate.low <= truth <= estimate.high for estimate in found])
     # Percentile intervals of a few dozen trials miss their confidence by up to 0.02.
     assert covered == pytest.approx(0.95, abs=0.02 + 4 * np.sqrt(0.95 * 0.05 / repetitions))
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_single_trials_have_no_resamples_and_what_they_enter_into_no_interval(paired):
+    generator = np.random.default_rng(0)
+    samples = [np.array([[1.0, 2.0]]), np.array([[3.0, 1.0]])]
+    resampled = resampled_means(samples, generator, paired)
+    assert np.isnan(resampled).all()
+    means = np.array([values.mean(axis=0) for values in samples])
+    found = function_interval(lambda points: points[..., 0].max(axis=-1), means, resampled)
+    assert found.mean == 3.0
+    assert np.isnan([found.low, found.high]).all()
+
+
+def test_one_single_trial_leaves_the_resamples_of_others():
+    generator = np.random.default_rng(0)
+    resampled = resampled_means([np.ones((1, 1)), np.arange(4.0)[:, None]], generator)
+    assert np.isnan(resampled[:, 0]).all()
+    assert np.isfinite(resampled[:, 1]).all()

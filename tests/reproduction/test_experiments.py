@@ -8,7 +8,13 @@ import qbumpers.reproduction as reproduction_package
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import REPRODUCTIONS
 from qbumpers.experiments.plan import make_plan
-from qbumpers.reproduction.experiments import command, overlaid, profiles, reproduction
+from qbumpers.reproduction.experiments import (
+    command,
+    deviations,
+    overlaid,
+    profiles,
+    reproduction,
+)
 from qbumpers.values import TabularValues
 from tests.narrowing import of_kind
 
@@ -241,6 +247,28 @@ def test_settings_are_overlaid_table_by_table():
     }  # fmt: skip
     longer = {"l": [{"q": 5}, {"q": 6}]}
     assert overlaid(base, longer)["l"] == longer["l"]
+
+
+@pytest.mark.parametrize("name", REPRODUCTIONS)
+def test_every_profile_is_the_papers_experiment_whatever_its_size(name):
+    for profile in profiles(name):
+        whole = reproduction(name, profile)
+        assert deviations(whole) == []
+        changes = {"trials": 3, "seed": 5, "criterion": 1.0, "common_random_numbers": True}
+        assert deviations(reproduction(name, profile, **changes)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"episodes": 20}, ["episodes = 20, not 100"]),
+        ({"alphas": [0.5]}, ["other assistants"]),
+        ({"values": "q-learning"}, ["values = 'q-learning', not 'exact'"]),
+        ({"episodes": 20, "alphas": [1.0]}, ["other assistants", "episodes = 20, not 100"]),
+    ],
+)
+def test_what_makes_it_another_experiment_is_named(changes, words):
+    assert deviations(reproduction("cliff-walking", **changes)) == words
 
 
 def test_the_command_of_a_profile_repeats_it_and_other_experiments_have_none():

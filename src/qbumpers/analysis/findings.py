@@ -1,6 +1,6 @@
 """Every table of a report, from the trials of a run."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -59,6 +59,7 @@ class Findings(NamedTuple):
         additions: what is added to the report of this experiment.
         headlines: what came out, in plain sentences; empty until `find` of a report adds them.
         cautions: what to keep in mind, in plain sentences; the same.
+        missing: how many trials each condition lacks, by id, if the run is not finished.
     """
 
     summary: pl.DataFrame
@@ -67,6 +68,7 @@ class Findings(NamedTuple):
     additions: Additions = Additions()
     headlines: Sequence[str] = ()
     cautions: Sequence[str] = ()
+    missing: Mapping[str, int] = {}
 
     @property
     def regrets(self) -> dict[str, Regret]:
@@ -104,7 +106,8 @@ def find_tables(
 def _about(
     index: int, table: pl.DataFrame, trials: pl.DataFrame, experiment: Experiment
 ) -> LearnerFindings:
-    paired = experiment.common_random_numbers
+    # Pairs need the same trials in every condition: a run that is not finished may lack some.
+    paired = experiment.common_random_numbers and _same_trials(trials)
 
     def generator(use: int) -> np.random.Generator:
         return np.random.default_rng([experiment.seed, index, use])
@@ -135,6 +138,10 @@ def _about(
         compared=compared,
         regrets=_regrets(table, trials, compared, generator, paired) if compared else {},
     )
+
+
+def _same_trials(trials: pl.DataFrame) -> bool:
+    return len({tuple(part["trial"]) for part in trials.partition_by("condition")}) == 1
 
 
 def _control(table: pl.DataFrame) -> str | None:

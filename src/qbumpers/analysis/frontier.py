@@ -56,9 +56,11 @@ def optimal_probability(
         resamples: how many.
 
     Returns:
-        The share of the resamples, by condition.
+        The share of the resamples, by condition; NaN if a condition has a single trial.
     """
     points = resampled_means(list(samples.values()), generator, paired, resamples)
+    if np.isnan(points).any():
+        return dict.fromkeys(samples, float("nan"))
     return dict(zip(samples, is_optimal(points).mean(axis=0).tolist(), strict=True))
 
 

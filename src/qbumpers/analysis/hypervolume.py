@@ -44,7 +44,8 @@ class Advantage(NamedTuple):
 
     Attributes:
         estimate: difference of their hypervolumes, in squared reward units.
-        probability: share of the resamples in which it is larger; ties count half.
+        probability: share of the resamples in which it is larger; ties count half. NaN if a
+            condition has a single trial.
     """
 
     estimate: IntervalEstimate
@@ -57,7 +58,8 @@ class Hypervolumes(NamedTuple):
     Attributes:
         reference: float64 [2], the point above which they are measured.
         methods: the hypervolume of each, in squared reward units.
-        largest: share of the resamples in which a method's is the largest; ties are shared.
+        largest: share of the resamples in which a method's is the largest; ties are shared. NaN if
+            a condition has a single trial.
         advantages: of a method over another, by both names; each pair once, the later method first.
     """
 
@@ -103,7 +105,7 @@ def compare_hypervolumes(
     def estimated(method: str) -> IntervalEstimate:
         """That area at the means, with its interval; an area is never negative."""
         found = function_interval(lambda points: covered(method, points), means, resampled)
-        return found._replace(low=max(0.0, found.low))
+        return found._replace(low=max(found.low, 0.0))  # NaN stays
 
     def advantage(first: str, second: str) -> Advantage:
         """How much more one method covers, and in which share of resamples it covers more."""
@@ -113,7 +115,11 @@ def compare_hypervolumes(
         wins = np.sign(replicates[first] - replicates[second])
         return Advantage(found, float(np.mean(0.5 + wins / 2)))
 
-    replicates = {method: covered(method, resampled) for method in places}
+    unknown = np.isnan(resampled).any()
+    replicates = {
+        method: np.full(resamples, np.nan) if unknown else covered(method, resampled)
+        for method in places
+    }
     largest = _largest(np.stack(list(replicates.values()), axis=-1))
     return Hypervolumes(
         reference=below,
@@ -128,5 +134,7 @@ def compare_hypervolumes(
 
 def _largest(replicates: np.ndarray) -> np.ndarray:
     """Share [K] of the replicates [B, K] in which each is the largest; ties are shared."""
+    if np.isnan(replicates).any():
+        return np.full(replicates.shape[-1], np.nan)
     largest = replicates == replicates.max(axis=-1, keepdims=True)
     return np.mean(largest / largest.sum(axis=-1, keepdims=True), axis=0)

@@ -1,7 +1,7 @@
 """Tables, figures and one self-contained page, from the files of a finished run alone."""
 
 import io
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +49,10 @@ def write_report(
     advance: Callable[[str], None] = lambda part: None,
     add: Add = nothing,
 ) -> Findings:
-    """Analyse a finished run: write tables, figures and `report.html` into its folder.
+    """Analyse a run: write tables, figures and `report.html` into its folder.
 
-    What an earlier analysis left there, and this one does not write, is removed.
+    Of a run that is not finished, the report says what is missing. What an earlier analysis left
+    there, and this one does not write, is removed.
 
     Args:
         folder: output folder of the run, a path or a URL.
@@ -63,11 +64,11 @@ def write_report(
         What the tables say.
 
     Raises:
-        RequestError: if the folder is not one of a finished run.
+        RequestError: if the folder is not one of a run of which some trials are finished.
         StoreError: if a file cannot be written.
     """
     folder = Path(folder)
-    results = load(folder)
+    results = load(folder, unfinished=True)
     advance("tables")
     findings = find(results, add)
     tables = _tables(findings)
@@ -95,6 +96,7 @@ def find(results: Results, add: Add = nothing) -> Findings:
     """
     trials = trial_measures(results.episodes, results.experiment.criterion)
     found = find_tables(trials, results.experiment, results.conditions)
+    found = found._replace(missing=results.missing)
     found = found._replace(additions=add(results, found))
     return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
 
@@ -104,19 +106,25 @@ def _tables(findings: Findings) -> dict[str, pl.DataFrame]:
     everyone = findings.learners
     tables = {
         SUMMARY: findings.summary,
-        METHODS: pl.concat([_marked(about, about.methods) for about in everyone]),
-        ADVANTAGES: pl.concat([_marked(about, about.advantages) for about in everyone]),
-        DIFFERENCES: pl.concat([_marked(about, about.differences) for about in everyone]),
+        METHODS: _together((about, about.methods) for about in everyone),
+        ADVANTAGES: _together((about, about.advantages) for about in everyone),
+        DIFFERENCES: _together((about, about.differences) for about in everyone),
         REGRET: pl.DataFrame(
             [_flat(about, m, r) for about in everyone for m, r in about.regrets.items()]
-        ),
+        ).fill_nan(None),
         **findings.additions.tables,
     }
     return {name: table for name, table in tables.items() if table.height}
 
 
-def _marked(about: LearnerFindings, table: pl.DataFrame) -> pl.DataFrame:
-    return table.select(pl.lit(about.learner).alias("learner"), pl.all()) if table.height else table
+def _together(tables: Iterable[tuple[LearnerFindings, pl.DataFrame]]) -> pl.DataFrame:
+    """Tables of several learners in one; those that have nothing to compare are left out."""
+    parts = [
+        table.select(pl.lit(about.learner).alias("learner"), pl.all())
+        for about, table in tables
+        if table.height
+    ]
+    return pl.concat(parts) if parts else pl.DataFrame()
 
 
 def _flat(about: LearnerFindings, matched: str, regret: Regret) -> dict[str, Any]:

@@ -66,16 +66,20 @@ def resampled_means(
         resamples: B.
 
     Returns:
-        float64 [B, C, M]; the measures of a trial stay together.
+        float64 [B, C, M]; the measures of a trial stay together. NaN for conditions of a single
+        trial, which do not say how much chance decides.
 
     Raises:
         RequestError: if pairs are asked for and the numbers of trials differ.
     """
-    if not paired:
-        return np.stack([_means(values, resamples, generator) for values in samples], axis=1)
-    _pairable({len(values) for values in samples})
-    together = _means(np.concatenate(samples, axis=1), resamples, generator)
-    return together.reshape(resamples, len(samples), -1)
+    if paired:
+        _pairable({len(values) for values in samples})
+        together = _means(np.concatenate(samples, axis=1), resamples, generator)
+        means = together.reshape(resamples, len(samples), -1)
+    else:
+        means = np.stack([_means(values, resamples, generator) for values in samples], axis=1)
+    means[:, [len(values) < 2 for values in samples]] = np.nan
+    return means
 
 
 def function_interval(
@@ -103,9 +107,11 @@ def function_interval(
 
     Returns:
         The function at the means; no interval if it has no value at more than 1% of the
-        resamples.
+        resamples, or a condition has no resamples.
     """
     found = float(function(means))
+    if np.isnan(resampled).any():
+        return IntervalEstimate(found, float("nan"), float("nan"))
     spans = [
         _basic(found, (function(means + far * (resampled - means)) - found) / far, confidence)
         for far in _DILATIONS

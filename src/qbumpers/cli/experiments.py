@@ -149,9 +149,15 @@ def run(
 
 @application.command()
 def report(
-    folder: Annotated[str, typer.Argument(help="Results of a finished run.", metavar="DIR")],
+    folder: Annotated[
+        str,
+        typer.Argument(help="Results of a finished run, or of one that goes on.", metavar="DIR"),
+    ],
 ) -> None:
-    """Write tables, figures and report.html of a finished run again."""
+    """Write tables, figures and report.html of a run again.
+
+    Of a run that is not finished, the report says what is missing.
+    """
     with stoppable():
         _analyse(folder)
 
@@ -187,12 +193,12 @@ def _announce(done: "RunProgress") -> None:
 def _analyse(folder: str) -> None:
     with OUTPUT.status("analysing") as status:
         from qbumpers.analysis.report import REPORT
-        from qbumpers.experiments.store import NEEDED
+        from qbumpers.experiments.store import files_to_read
         from qbumpers.files import local_copy
         from qbumpers.reproduction.printed import PUBLISHED
         from qbumpers.reproduction.report import write_report
 
-        with local_copy(folder, NEEDED) as place:
+        with local_copy(folder, files_to_read(folder)) as place:
             findings = write_report(place, advance=lambda part: status.update(f"writing {part}"))
     for learner, rows in findings.summary.group_by("learner", maintain_order=True):
         OUTPUT.print(_summary_table(str(learner[0]), rows))
@@ -218,9 +224,12 @@ def _summary_table(learner: str, summary: "pl.DataFrame") -> Table:
         ]
         condition = row["condition"].removesuffix(f"@{own}")
         listing.add_row(condition, *cells, f"{row['overrides_mean']:.2f}")
+    what = "Mean assisted and unassisted returns, and overrides per episode"
+    single = summary["trials"].max() == 1
     listing.caption = (
-        "Mean assisted and unassisted returns, and overrides per episode, with 95% intervals over "
-        "trials."
+        f"{what}; one trial per condition has no interval."
+        if single
+        else f"{what}, with 95% intervals over trials."
     )
     return listing
 

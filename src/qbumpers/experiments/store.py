@@ -16,7 +16,7 @@ import tomli_w
 
 import qbumpers
 from qbumpers.errors import RequestError
-from qbumpers.experiments.cells import Cell
+from qbumpers.experiments.cells import Cell, tiles
 from qbumpers.experiments.columns import EPISODE_COLUMNS, STATE_COLUMNS, check_columns
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.record import (
@@ -85,6 +85,17 @@ class Results(NamedTuple):
     values: TabularValues | NetworkValues
     conditions: Sequence[RecordedCondition]
 
+    @property
+    def missing(self) -> dict[str, int]:
+        """How many trials each condition lacks, by id; nothing of a finished run."""
+        counts = self.episodes.group_by("condition").agg(pl.col("trial").n_unique())
+        there = dict(counts.iter_rows())
+        lacking = {
+            each.condition: self.experiment.trials - there.get(each.condition, 0)
+            for each in self.conditions
+        }
+        return {condition: trials for condition, trials in lacking.items() if trials}
+
 
 class Survey(NamedTuple):
     """What finished work an output folder holds.
@@ -149,7 +160,7 @@ class Store:
         return Survey(cells, damaged, changed)
 
     def _is_whole(self, file: CellFile) -> bool:
-        return _digest(self._folder.read(file.name) or b"") == file.digest
+        return _content(self._folder, file) is not None
 
     def write(self, cell: Cell, files: Mapping[str, bytes]) -> None:
         """Keep the tables of a cell, encoded, by kind; it is whole when all are there."""
@@ -292,25 +303,53 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
         yield Store(place, tables_of(experiment), record, before)
 
 
-def load(folder: str | Path) -> Results:
+def load(folder: str | Path, *, unfinished: bool = False) -> Results:
     """What an output folder holds, as Polars frames.
 
     Args:
-        folder: output folder of a finished run, a path or a URL.
+        folder: output folder of a run, a path or a URL.
+        unfinished: whether to load what there is of a run that is not finished; `Results.missing`
+            then says what is not there.
 
     Returns:
         The experiment and its tables.
 
     Raises:
-        RequestError: if the folder is not one of a finished run, or damaged.
+        RequestError: if the folder is not one of a run, or damaged; if the run is not finished,
+            unless that is allowed and some trials are.
     """
     place = open_folder(folder)
     experiment = load_design(folder)
-    contents = {name: place.read(name) for name in tables_of(experiment)}
-    if None in contents.values():
-        raise _unfinished(place)
+    tables = _whole_tables(place, experiment)
+    if tables is None:
+        record = decoded_record(place.read(CONDITIONS))
+        tables = _tables_of_cells(place, experiment, record) if unfinished and record else None
+    if tables is None:
+        raise RequestError(
+            f"results folder {folder}: the run is not finished; run it again to continue"
+        )
+    conditions = conditions_of(folder, experiment, tables[EPISODES])
+    values = _values(place, experiment)
+    return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
+
+
+def _values(folder: Folder, experiment: Experiment) -> TabularValues | NetworkValues:
+    content = folder.read(VALUES)
+    if content is None:
+        raise RequestError(f"results folder {folder}: it holds no {VALUES}")
+    values = decoded_values(content, f"{folder}/{VALUES}")
+    if experiment.tabular and not isinstance(values, TabularValues):
+        raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
+    return values
+
+
+def _whole_tables(folder: Folder, experiment: Experiment) -> dict[str, pl.DataFrame] | None:
+    """The tables of a finished run; None if they are not there, or those of another part of it."""
+    contents = {name: folder.read(name) for name in (EPISODES, STATES)}
+    if any(contents[name] is None for name in tables_of(experiment)):
+        return None
     try:
-        tables = {n: pl.read_parquet(io.BytesIO(content or b"")) for n, content in contents.items()}
+        tables = {n: pl.read_parquet(io.BytesIO(c)) for n, c in contents.items() if c is not None}
     except pl.exceptions.PolarsError as error:
         raise RequestError(
             f"results folder {folder}: damaged; run it again to mend it ({error})"
@@ -318,18 +357,49 @@ def load(folder: str | Path) -> Results:
     for name, table in tables.items():
         check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
-    conditions = conditions_of(folder, experiment, episodes)
-    rows = len(conditions) * experiment.trials * (experiment.episodes + experiment.retention)
-    ids = {each.condition for each in conditions}
-    if episodes.height != rows or set(episodes["condition"].unique()) != ids:
-        raise _unfinished(place)
-    kept = place.read(VALUES)
-    if kept is None:
-        raise _unfinished(place)
-    values = decoded_values(kept, f"{folder}/{VALUES}")
-    if experiment.tabular and not isinstance(values, TabularValues):
-        raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
-    return Results(experiment, episodes, tables.get(STATES), values, conditions)
+    ids = {each.condition for each in conditions_of(str(folder), experiment, episodes)}
+    rows = len(ids) * experiment.trials * (experiment.episodes + experiment.retention)
+    whole = episodes.height == rows and set(episodes["condition"].unique()) == ids
+    return tables if whole else None
+
+
+def _tables_of_cells(
+    folder: Folder, experiment: Experiment, record: Record
+) -> dict[str, pl.DataFrame] | None:
+    """Tables of what is finished of a run; None if nothing is."""
+    files = {each.content: cell_files(folder, each.content) for each in record.conditions}
+    kinds = sorted({file.kind for found in files.values() for file in found}, reverse=True)
+    tables: dict[tuple[Cell, str], pl.DataFrame] = {}
+    parts = []
+    for each in record.conditions:
+        usable = [f for f in files[each.content] if usable_for(each.identity, f.identity, record)]
+        whole = [(file, content) for file in usable if (content := _content(folder, file))]
+        tables |= {(f.cell, f.kind): pl.read_parquet(io.BytesIO(c)) for f, c in whole}
+        cells = whole_cells([file for file, _ in whole], kinds)
+        size = max((cell.trials for cell in cells), default=1)
+        chosen = tiles(each.content, experiment.trials, size, cells)
+        parts += [(each, cell) for cell in chosen if cell in cells]
+    if not parts:
+        return None
+    return {
+        kind: assembled(parts, kind, lambda cell, kind=kind: tables[cell, kind]) for kind in kinds
+    }
+
+
+def _content(folder: Folder, file: CellFile) -> bytes | None:
+    """What a cell's file holds; None if it is damaged."""
+    content = folder.read(file.name) or b""
+    return content if _digest(content) == file.digest else None
+
+
+def files_to_read(folder: str | Path) -> Iterator[str]:
+    """Names of the files that a report needs, those of cells too if the run is not finished."""
+    yield from NEEDED
+    place = open_folder(folder)
+    record = decoded_record(place.read(CONDITIONS))
+    if record is not None and _whole_tables(place, load_design(folder)) is None:
+        for each in record.conditions:
+            yield from (file.name for file in cell_files(place, each.content))
 
 
 def conditions_of(
@@ -355,12 +425,6 @@ def conditions_of(
             )
             for row in table.select(columns).unique(maintain_order=True).iter_rows(named=True)
         ]
-
-
-def _unfinished(folder: Folder) -> RequestError:
-    return RequestError(
-        f"results folder {folder}: the run is not finished; run it again to continue"
-    )
 
 
 def _described(experiment: Experiment) -> str:

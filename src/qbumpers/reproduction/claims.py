@@ -111,7 +111,7 @@ def claim_sentence(claim: Claim) -> str:
 
 def claims_frame(claims: Sequence[Claim]) -> pl.DataFrame:
     """The content of `claims.csv`: every piece of evidence with its claim and verdict."""
-    return pl.DataFrame([row for claim in claims for row in _evidence_rows(claim)])
+    return pl.DataFrame([row for claim in claims for row in _evidence_rows(claim)]).fill_nan(None)
 
 
 def _evidence_rows(claim: Claim) -> list[dict[str, Any]]:

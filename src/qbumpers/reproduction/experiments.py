@@ -79,6 +79,35 @@ def reproduction(
     return make_experiment(settings, f"{name}, profile {profile}", large=True)
 
 
+_OF_THIS_RUN = {"name", "trials", "seed", "criterion", "retention", "common_random_numbers"}
+
+
+def deviations(experiment: Experiment) -> list[str]:
+    """What makes an experiment another one than the published one that it reproduces.
+
+    More or fewer learners, other random numbers, and how results are read do not.
+
+    Args:
+        experiment: that reproduces one.
+
+    Returns:
+        Words on each field that differs from the nearest profile; empty if it is the paper's.
+    """
+    name = experiment.reproduces or ""
+    found = [_different(experiment, reproduction(name, profile)) for profile in profiles(name)]
+    return min(found, key=len)
+
+
+def _different(experiment: Experiment, published: Experiment) -> list[str]:
+    words = []
+    for field in experiment.__class__.model_fields:
+        now, then = getattr(experiment, field), getattr(published, field)
+        if field not in _OF_THIS_RUN and now != then:
+            plain = isinstance(now, int | str)
+            words.append(f"{field} = {now!r}, not {then!r}" if plain else f"other {field}")
+    return words
+
+
 def command(experiment: Experiment) -> str:
     """The command that repeats an experiment; empty if it is no profile of a published one."""
     name = experiment.reproduces

@@ -125,7 +125,7 @@ def _comparison(
 
 def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
     """The content of `published.csv`: every comparison."""
-    return pl.DataFrame([_flat(row) for row in comparisons])
+    return pl.DataFrame([_flat(row) for row in comparisons]).fill_nan(None)
 
 
 def _flat(row: Comparison) -> dict[str, Any]:
@@ -139,12 +139,24 @@ def _flat(row: Comparison) -> dict[str, Any]:
     }
 
 
-def comparisons_section(comparisons: Sequence[Comparison]) -> Section:
-    """The section of a report that holds every printed number beside the measured one."""
-    introduction = Markup(
-        "<p>Every number that the paper prints for this experiment. They <em>agree</em> if they "
-        "differ by no more than two samples of this size would, 99 times in 100.</p>"
+def comparisons_section(comparisons: Sequence[Comparison], why: str = "") -> Section:
+    """The section of a report that holds every printed number beside the measured one.
+
+    Args:
+        comparisons: at least one.
+        why: there is no verdict; empty if there is.
+    """
+    explained = (
+        no_verdict(why)
+        if why
+        else (
+            "They agree if they differ by no more than two samples of this size would, 99 times in "
+            "100. One trial has no interval, and no verdict."
+        )
     )
+    introduction = Markup(
+        "<p>The numbers that the paper prints for its experiment, beside those of this one. {}</p>"
+    ).format(explained)
     content = [introduction, comparisons_table(comparisons)]
     return Section("published", "Against the paper", "methods", content)
 
@@ -174,6 +186,11 @@ def comparisons_table(comparisons: Sequence[Comparison]) -> Table:
         for row in comparisons
     ]
     return Table(columns, rows, PUBLISHED, cards=True)
+
+
+def no_verdict(why: str) -> str:
+    """That printed numbers neither agree nor disagree with the measured ones, and why."""
+    return f"No verdict is given on the numbers that the paper prints: {why}."
 
 
 def disagreements(comparisons: Sequence[Comparison]) -> list[str]:

@@ -9,7 +9,7 @@ from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.findings import Findings
 from qbumpers.experiments.store import Results
 from qbumpers.reproduction.claims import CLAIMS
-from qbumpers.reproduction.experiments import command, package_of
+from qbumpers.reproduction.experiments import command, deviations, package_of
 from qbumpers.reproduction.printed import PUBLISHED
 
 
@@ -24,7 +24,17 @@ def additions(results: Results, findings: Findings) -> Additions:
     if name is None:
         return Additions()
     paper = importlib.import_module(f"{package_of(name)}.additions")
-    return paper.additions(results, findings)._replace(command=command(results.experiment))
+    why = unlike_the_paper(results, findings)
+    added = paper.additions(results, findings, why)
+    return added._replace(command=command(results.experiment))
+
+
+def unlike_the_paper(results: Results, findings: Findings) -> str:
+    """Why results cannot be held against the paper's, in words; empty if they can."""
+    different = deviations(results.experiment)
+    if different:
+        return f"the experiment is not the paper's ({'; '.join(different)})"
+    return "the run is not finished" if findings.missing else ""
 
 
 def find(results: Results) -> Findings:
@@ -35,7 +45,7 @@ def find(results: Results) -> Findings:
 def write_report(
     folder: str | Path, advance: Callable[[str], None] = lambda part: None
 ) -> Findings:
-    """Analyse a finished run, published or not: `qbumpers.analysis.report.write_report`.
+    """Analyse a run, published or not: `qbumpers.analysis.report.write_report`.
 
     Args:
         folder: output folder of the run, a path or a URL.
@@ -45,7 +55,7 @@ def write_report(
         What the tables say.
 
     Raises:
-        RequestError: if the folder is not one of a finished run.
+        RequestError: if the folder is not one of a run of which some trials are finished.
         StoreError: if a file cannot be written.
     """
     findings = report.write_report(folder, advance, additions)

@@ -26,7 +26,7 @@ def states():
 
 
 def drawn_from(table, conditions=CONDITIONS):
-    return heatmap_figure(visit_counts(table, conditions, EPISODES))
+    return heatmap_figure(visit_counts(table, dict.fromkeys(conditions, EPISODES)))
 
 
 def maps_of(drawing):
@@ -71,12 +71,15 @@ def test_rows_and_maps_are_named_and_share_one_scale():
 
 
 def test_the_numbers_behind_the_maps_are_in_the_order_asked_for():
-    counts = visit_counts(states(), CONDITIONS[::-1], EPISODES)
+    counts = visit_counts(states(), {CONDITIONS[1]: EPISODES, CONDITIONS[0]: 2 * EPISODES})
     assert counts["condition"].unique(maintain_order=True).to_list() == CONDITIONS[::-1]
     first = counts.row(0, named=True)
     [state] = states().filter(condition=CONDITIONS[1], state=0).to_dicts()
     assert (first["row"], first["column"]) == (0, 0)
     assert first["assisted"] == state["assisted"] / EPISODES
+    last = counts.row(-1, named=True)
+    [state] = states().filter(condition=CONDITIONS[0], state=ROWS * COLUMNS - 1).to_dicts()
+    assert last["unassisted"] == state["unassisted"] / (2 * EPISODES)
 
 
 def test_a_condition_that_was_never_overridden_is_drawn_all_grey():

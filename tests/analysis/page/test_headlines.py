@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -11,7 +12,7 @@ from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.page.headlines import cautions, headlines
 from qbumpers.analysis.statistics import IntervalEstimate
 from qbumpers.experiments.sources import make_experiment
-from tests.analysis.examples import summary_table
+from tests.analysis.examples import ALPHAS, summary_table
 from tests.experiments.examples import settings
 
 NAN = IntervalEstimate(math.nan, math.nan, math.nan)
@@ -117,21 +118,44 @@ def test_sentences_on_one_of_several_learners_say_which():
     assert all(sentence.startswith("With penalty=2: ") for sentence in found[half:])
 
 
-def warned(learner=None, **changes):
-    findings = Findings(summary_table(), pl.DataFrame(), [learner or about()])
+def found_of(trials: int | list[int] = 20, **parts):
+    """Findings of conditions that have so many trials each."""
+    return Findings(
+        summary_table().with_columns(trials=pl.Series(np.broadcast_to(trials, len(ALPHAS)))),
+        pl.DataFrame(),
+        **{"learners": [about()], **parts},
+    )
+
+
+def warned(learner=None, trials: int | list[int] = 20, **changes):
+    findings = found_of(trials, learners=[learner or about()])
     return cautions(findings, make_experiment(settings(**{"trials": 20, **changes})))
 
 
 def test_small_experiments_are_cautioned_about():
     assert "one trial" in warned(trials=1)[0]
     assert "only 19 trials" in warned(trials=19)[0]
+    assert "only 19 trials" in warned(trials=[19, *[20] * 9])[0]
+    assert "Conditions of a single trial have no interval" in warned(trials=[1, *[20] * 9])[0]
     assert "one episode" in warned(episodes=1)[0]
     assert not any("trials per condition" in sentence for sentence in warned())
 
 
+def test_a_run_that_is_not_finished_says_what_is_missing():
+    missing = {"none": 3, "absent": 20}
+    [first, *_] = cautions(found_of(missing=missing), make_experiment(settings(trials=20)))
+    assert first == (
+        "The run is not finished: 197 of 220 trials are there, and 2 of 11 conditions lack some: "
+        "none (17 of 20), absent (0 of 20). Run it again to continue."
+    )
+    many = {f"absent/{number}": 20 for number in range(8)}
+    [first, *_] = cautions(found_of(missing=many), make_experiment(settings(trials=20)))
+    assert "absent/5 (0 of 20) and 2 more. Run it" in first
+
+
 def test_what_is_added_is_told_too():
     added = Additions(headlines=["First."], cautions=["Beware."])
-    findings = Findings(summary_table(), pl.DataFrame(), [about()], added)
+    findings = found_of(additions=added)
     assert headlines(findings)[0] == "First."
     assert "Beware." in cautions(findings, make_experiment(settings(trials=20)))
 

@@ -38,7 +38,7 @@ def found(reproduced):
 def test_a_report_comes_with_its_tables_and_figures(reproduced):
     names = {path.name for path in reproduced.iterdir()}
     assert names - {".lock"} == {
-        "cells", "episodes.parquet", "experiment.toml", "figures", "report.html",
+        "cells", "conditions.json", "episodes.parquet", "experiment.toml", "figures", "report.html",
         "states.parquet", "trials.parquet", "values.npz", *(f"{name}.csv" for name in TABLES),
     }  # fmt: skip
     drawn = {path.name for path in (reproduced / "figures").iterdir()}

@@ -124,7 +124,7 @@ def test_a_single_trial_is_reported_too(tmp_path):
 def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
     found, results = load_archive(kept), load(landed)
     assert found.experiment == results.experiment
-    assert found.run["format"] == 3
+    assert found.run["format"] == 2
     trials = trial_measures(results.episodes, results.experiment.criterion)
     assert_frame_equal(found.trials, trials, rel_tol=1e-6, check_dtypes=False)
     curves = learning_curves(results.episodes, CHOSEN)

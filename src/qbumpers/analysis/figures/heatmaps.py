@@ -1,6 +1,6 @@
 """Where learners went and where they were overridden, on the task's grid."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 import matplotlib as mpl
 import numpy as np
@@ -21,21 +21,22 @@ _WIDTH, _GAP = 10, 0.04  # of the figure in inches; between maps, of a map's wid
 _COLOURS = mpl.colormaps["viridis"].with_extremes(bad="#e9e9e9")
 
 
-def visit_counts(states: pl.DataFrame, conditions: Sequence[str], episodes: int) -> pl.DataFrame:
+def visit_counts(states: pl.DataFrame, episodes: Mapping[str, int]) -> pl.DataFrame:
     """Steps per episode in each cell of a grid.
 
     Args:
         states: as in `states.parquet`, of a task on a grid.
-        conditions: which ones.
-        episodes: over all trials of a condition; counts are divided by it.
+        episodes: of the conditions that are asked for, by id, over all their trials; counts are
+            divided by it.
 
     Returns:
         A row per condition and grid cell: condition, row, column, assisted, overridden, unassisted.
     """
-    chosen = states.filter(pl.col("condition").is_in(list(conditions)))
-    order = pl.col("condition").replace_strict({c: i for i, c in enumerate(conditions)})
+    chosen = states.filter(pl.col("condition").is_in(list(episodes)))
+    order = pl.col("condition").replace_strict({c: i for i, c in enumerate(episodes)})
+    number = pl.col("condition").replace_strict(dict(episodes), return_dtype=pl.Float64)
     return chosen.sort(order, "state").select(
-        "condition", "row", "column", *(pl.col(name) / episodes for name in _PANELS)
+        "condition", "row", "column", *(pl.col(name) / number for name in _PANELS)
     )
 
 

@@ -26,12 +26,17 @@ def spreads(trials: pl.DataFrame, conditions: Sequence[str]) -> pl.DataFrame:
 
     Returns:
         A row per condition and measure: measure, condition, and quantiles: low (5%), quarter,
-        median, three_quarters, high (95%).
+        median, three_quarters, high (95%); of a single trial, the median alone.
     """
     chosen = trials.filter(pl.col("condition").is_in(list(conditions)))
     parts = [
         chosen.group_by("condition", maintain_order=True)
-        .agg(pl.col(measure).quantile(q, "linear").alias(n) for n, q in _QUANTILES.items())
+        .agg(
+            pl.when((pl.len() > 1) | pl.lit(name == "median"))
+            .then(pl.col(measure).quantile(share, "linear"))
+            .alias(name)
+            for name, share in _QUANTILES.items()
+        )
         .select(pl.lit(measure).alias("measure"), pl.all())
         for measure in _PANELS
     ]

@@ -40,11 +40,19 @@ def drawings(results: Results, findings: Findings) -> list[Drawing]:
     return [*found, *added.drawings]
 
 
+def _without_intervals(summary: pl.DataFrame) -> str:
+    """What a caption adds if there are conditions of a single trial."""
+    single = (summary["trials"] < 2).sum()
+    if single == summary.height:
+        return " There is one trial per condition, which has no interval: none is drawn."
+    return " Conditions of a single trial have no interval." if single else ""
+
+
 def _of_learner(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look], added: Additions
 ) -> Iterator[Drawing]:
     """What compares the conditions of one learner."""
-    make = partial(_drawing, about.label)
+    make = partial(_drawing, about)
     yield make(
         "frontier",
         "Mean unassisted return against mean assisted return, over all episodes of a trial; bars "
@@ -78,7 +86,7 @@ def _of_learning(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look], chosen: Sequence[str]
 ) -> Iterator[Drawing]:
     """Returns and successes of chosen conditions by episode, or returns of a few of all."""
-    make = partial(_drawing, about.label)
+    make = partial(_drawing, about)
     shown = list(chosen) or curves.representative(about.summary)
     end = _smoothed(results.experiment) + ", with 95% bands over trials; a few conditions."
     end += " Grey: the assistant is gone." * (results.experiment.retention > 0)
@@ -101,7 +109,7 @@ def _of_overrides(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
 ) -> Iterator[Drawing]:
     """When and where assistants overrode."""
-    make = partial(_drawing, about.label)
+    make = partial(_drawing, about)
     chosen = curves.representative(about.summary)
     overridden = about.summary.filter(
         pl.col("condition").is_in(chosen) & (pl.col("overrides_mean") > 0)
@@ -115,12 +123,13 @@ def _of_overrides(
             partial(curves.courses_figure, drawn=drawn),
         )
     if results.states is not None and results.states["row"].null_count() == 0:
-        episodes = results.experiment.trials * results.experiment.episodes
+        trials = dict(about.summary.select("condition", "trials").iter_rows())
+        episodes = {c: trials[c] * results.experiment.episodes for c in chosen}
         yield make(
             "heatmaps",
             "Steps per episode in each grid cell, on a logarithmic scale: assisted, overridden, "
             "and unassisted. Grey cells were never entered.",
-            heatmaps.visit_counts(results.states, chosen, episodes),
+            heatmaps.visit_counts(results.states, episodes),
             heatmaps.heatmap_figure,
         )
 
@@ -133,7 +142,7 @@ def _smoothed(experiment: Experiment) -> str:
 def _of_options(
     results: Results, about: LearnerFindings, drawn: Mapping[str, Look]
 ) -> Iterator[Drawing]:
-    make = partial(_drawing, about.label)
+    make = partial(_drawing, about)
     options = dict.fromkeys(option for each in results.conditions for option in each.options)
     swept = sensitivity.sensitivities(about.summary, list(options))
     if swept.height:
@@ -161,10 +170,12 @@ def _legible(summary: pl.DataFrame) -> list[str]:
 
 
 def _drawing(
-    label: str,
+    about: LearnerFindings,
     kind: str,
     caption: str,
     numbers: pl.DataFrame,
     figure: Callable[[pl.DataFrame], Figure],
 ) -> Drawing:
-    return Drawing(kind, label, caption, numbers, partial(figure, numbers))
+    if kind != "heatmaps":
+        caption += _without_intervals(about.summary)
+    return Drawing(kind, about.label, caption, numbers, partial(figure, numbers))

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from matplotlib.figure import Figure
 
 from qbumpers.analysis.figures.style import readable
-from qbumpers.analysis.formatting import decimals_for, format_number, format_share
+from qbumpers.analysis.formatting import NONE, decimals_for, format_number, format_share
 
 
 class Column(NamedTuple):
@@ -97,6 +97,10 @@ def share(mean: float | None, low: float | None, high: float | None) -> Markup:
 
 
 def _with_range(mean: str, low: str, high: str) -> Markup:
+    if mean == NONE:
+        return Markup(NONE)
+    if NONE in (low, high):
+        return Markup('{} <span class="range">no interval</span>').format(mean)
     return Markup('{} <span class="range">[{}, {}]</span>').format(mean, low, high)
 
 

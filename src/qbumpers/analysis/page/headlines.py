@@ -12,8 +12,8 @@ from qbumpers.analysis.formatting import decimals_for, format_number, format_sha
 from qbumpers.analysis.frontier import Regret
 from qbumpers.experiments.design import Experiment
 
-FEW_TRIALS = 20
-"""With fewer trials, intervals are rough."""
+FEW_TRIALS, MOST_NAMED = 20, 6
+"""With fewer trials, intervals are rough; conditions that a sentence names."""
 
 
 def headlines(findings: Findings) -> list[str]:
@@ -148,15 +148,39 @@ def cautions(findings: Findings, experiment: Experiment) -> list[str]:
     Returns:
         Sentences; empty if there is nothing to warn of.
     """
-    return [*_of_size(experiment), *findings.additions.cautions, *_of_ties(findings)]
+    return [
+        *_of_what_is_missing(findings, experiment),
+        *_of_size(findings, experiment),
+        *findings.additions.cautions,
+        *_of_ties(findings),
+    ]
 
 
-def _of_size(experiment: Experiment) -> Iterator[str]:
-    if experiment.trials == 1:
+def _of_what_is_missing(findings: Findings, experiment: Experiment) -> Iterator[str]:
+    if not findings.missing:
+        return
+    absent = findings.missing.keys() - set(findings.summary["condition"])
+    conditions = findings.summary.height + len(absent)
+    of, lacking = conditions * experiment.trials, list(findings.missing.items())
+    there = of - sum(findings.missing.values())
+    named = [f"{name} ({experiment.trials - n} of {experiment.trials})" for name, n in lacking]
+    more = f" and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
+    yield (
+        f"The run is not finished: {there:,} of {of:,} trials are there, and "
+        f"{len(lacking)} of {conditions} conditions lack some: {', '.join(named[:MOST_NAMED])}"
+        f"{more}. Run it again to continue."
+    )
+
+
+def _of_size(findings: Findings, experiment: Experiment) -> Iterator[str]:
+    trials = findings.summary["trials"].to_list()
+    if max(trials) == 1:
         yield "There is one trial per condition: nothing here has an interval."
-    elif experiment.trials < FEW_TRIALS:
+    elif min(trials) == 1:
+        yield "Conditions of a single trial have no interval, nor has what they enter into."
+    elif min(trials) < FEW_TRIALS:
         yield (
-            f"There are only {experiment.trials} trials per condition: intervals are wide, and "
+            f"There are only {min(trials)} trials per condition: intervals are wide, and "
             f"those from resampling tend to be too narrow below {FEW_TRIALS} trials."
         )
     if experiment.episodes == 1:

@@ -172,11 +172,26 @@ def dependence_table(about: LearnerFindings) -> Table:
 def learners_table(learners: Sequence[LearnerFindings], measure: str) -> Table:
     """One measure of every condition, a column per learner."""
     columns = [Column("condition", text=True), *(Column(about.label) for about in learners)]
-    everyone = zip(*(about.summary.iter_rows(named=True) for about in learners), strict=True)
+    found: dict[str, dict[str, Markup]] = {}
+    for about in learners:
+        for row in about.summary.iter_rows(named=True):
+            shared = str(row["condition"]).partition("@")[0]
+            found.setdefault(shared, {})[about.learner] = _of(row, measure)
     rows = [
-        [unbroken(row[0]["condition"]), *(_of(one, measure) for one in row)] for row in everyone
+        [unbroken(condition), *(cells.get(about.learner, NONE) for about in learners)]
+        for condition, cells in found.items()
     ]
     return Table(columns, rows, cards=True)
+
+
+def missing_table(missing: Mapping[str, int], trials: int) -> Table:
+    """The conditions that lack trials, if the run is not finished."""
+    columns = [Column("condition", text=True), Column("trials there"), Column("of")]
+    rows = [
+        [breakable(condition), str(trials - number), str(trials)]
+        for condition, number in missing.items()
+    ]
+    return Table(columns, rows, folded="What is missing, by condition")
 
 
 def conditions_table(about: LearnerFindings) -> Table:

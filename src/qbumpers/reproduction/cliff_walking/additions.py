@@ -27,6 +27,7 @@ from qbumpers.reproduction.printed import (
     comparisons_frame,
     comparisons_section,
     disagreements,
+    no_verdict,
     printed_marks,
     printed_numbers,
 )
@@ -37,18 +38,21 @@ SHOWN_THRESHOLDS = (0.5, 0.499, 0.0195, 0.018)
 """Before and after each change of behaviour."""
 
 
-def additions(results: Results, findings: Findings) -> Additions:
+def additions(results: Results, findings: Findings, why: str) -> Additions:
     """Comparisons with printed numbers, and why no threshold serves.
 
     Args:
         results: what the run's output folder holds.
         findings: what the tables say about these results.
+        why: the results cannot be held against the paper's; empty if they can.
     """
     numbers = printed_numbers("cliff-walking")
     comparisons = compare(numbers, findings.summary, findings.regrets)
-    section = [comparisons_section(comparisons)] if comparisons else []
+    if why:
+        comparisons = [each._replace(agrees=None) for each in comparisons]
+    section = [comparisons_section(comparisons, why)] if comparisons else []
     return Additions(
-        cautions=disagreements(comparisons),
+        cautions=[no_verdict(why)] if why and comparisons else disagreements(comparisons),
         tables={PUBLISHED: comparisons_frame(comparisons)} if comparisons else {},
         sections=[*section, *_threshold_sections(results, findings)],
         marks=printed_marks(numbers),
