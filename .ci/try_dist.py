@@ -14,6 +14,7 @@ import tarfile
 import tempfile
 import zipfile
 from email.parser import BytesParser
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,9 +40,8 @@ def main() -> None:
         sys.exit("no Python from 3.11 on with ensurepip is here")
     print(f"{wheel.name}: trying Python {', '.join(found)}", flush=True)
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        for version, problem in zip(
-            found, pool.map(tried, found.values(), [wheel] * len(found)), strict=True
-        ):
+        problems = pool.map(partial(tried, wheel), found.values())
+        for version, problem in zip(found, problems, strict=True):
             print(f"Python {version}: {problem or 'installed, demo run'}", flush=True)
             if problem:
                 sys.exit(1)

@@ -21,7 +21,7 @@ from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.findings import find_tables
 from qbumpers.analysis.measures import trial_measures
 from qbumpers.errors import RequestError
-from qbumpers.experiments.store import load
+from qbumpers.experiments.store import FORMAT, load
 from qbumpers.reproduction.lunar_lander.claims import decisive_conditions, experiment_claims
 from qbumpers.reproduction.report import find, write_report
 from qbumpers.values import shipped
@@ -124,7 +124,7 @@ def test_a_single_trial_is_reported_too(tmp_path):
 def test_what_is_kept_tells_the_same_as_the_run(landed, kept):
     found, results = load_archive(kept), load(landed)
     assert found.experiment == results.experiment
-    assert found.run["format"] == 2
+    assert found.run["format"] == FORMAT
     trials = trial_measures(results.episodes, results.experiment.criterion)
     assert_frame_equal(found.trials, trials, rel_tol=1e-6, check_dtypes=False)
     curves = learning_curves(results.episodes, CHOSEN)
