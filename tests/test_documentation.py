@@ -38,7 +38,7 @@ PAGES = {
 }
 RUNNING = ("python", "sh")
 RUN_LANGUAGES = (*RUNNING, "toml", "text")
-INTERNAL = ("borrowing", "cli", "compilation", "kept_code", "errors", "files", "source")
+INTERNAL = ("borrowing", "cli", "compilation", "errors", "files", "kept_code", "source")
 INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
 CITED_HOSTS = {"doi.org", "arxiv.org"}
 

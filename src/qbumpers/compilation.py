@@ -310,10 +310,12 @@ def result_type(function: Any, *types: Any) -> Any:
     Raises:
         CompilationError: if it cannot be compiled.
     """
-    try:
-        function.compile(types)
-    except Exception as error:  # Numba raises much beside its own kind of errors
-        raise CompilationError(str(error)) from error
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of what Numba itself does
+        try:
+            function.compile(types)
+        except Exception as error:  # Numba raises much beside its own kind of errors
+            raise CompilationError(str(error)) from error
     # A constant has a type of its own, which is also that of other whole numbers.
     return numba.types.unliteral(function.overloads[types].signature.return_type)
 

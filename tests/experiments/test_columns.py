@@ -59,9 +59,9 @@ def test_values_of_another_kind_of_task_are_refused(folder):
         load(folder)
 
 
-def test_values_that_are_gone_are_a_run_that_is_not_finished(folder):
+def test_values_that_are_gone_are_named(folder):
     (folder / "values.npz").unlink()
-    with pytest.raises(RequestError, match="the run is not finished"):
+    with pytest.raises(RequestError, match=r"run: it holds no values\.npz"):
         load(folder)
 
 

@@ -88,16 +88,23 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
     tables = _whole_tables(place, experiment, record)
     if tables is None and unfinished and record is not None:
         tables = _tables_of_cells(place, experiment, record)
-    kept = place.read(VALUES)
-    if tables is None or kept is None:
+    if tables is None:
         raise RequestError(
             f"results folder {folder}: the run is not finished; run it again to continue"
         )
     conditions = conditions_of(record, experiment, tables[EPISODES])
-    values = decoded_values(kept, f"{folder}/{VALUES}")
+    values = _values(place, experiment)
+    return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
+
+
+def _values(folder: Folder, experiment: Experiment) -> TabularValues | NetworkValues:
+    content = folder.read(VALUES)
+    if content is None:
+        raise RequestError(f"results folder {folder}: it holds no {VALUES}")
+    values = decoded_values(content, f"{folder}/{VALUES}")
     if experiment.tabular and not isinstance(values, TabularValues):
         raise RequestError(f"values file {folder}/{VALUES}: of task {values.task}, not of this run")
-    return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
+    return values
 
 
 def _whole_tables(
