@@ -64,9 +64,12 @@ def test_a_discount_out_of_range_is_refused(discount):
 
 
 def test_a_discount_out_of_range_in_the_values_is_refused():
-    values = TabularValues(np.zeros((48, 4)), discount=3.0, task="", method="")
     with pytest.raises(RequestError, match=r"discount = 3\.0; it must lie in"):
-        walking("none", values)
+        TabularValues(np.zeros((48, 4)), discount=3.0, task="", method="")
+    stated = lambda _: [0.0] * 4  # noqa: E731
+    stated.discount = 3.0
+    with pytest.raises(RequestError, match=r"discount = 3\.0; it must lie in"):
+        walking("none", stated)
 
 
 def test_a_values_file_that_does_not_exist_is_refused(tmp_path):

@@ -8,8 +8,17 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 
+_LONGEST_SHOWN = 80
+
+
 class RequestError(ValueError):
     """The request was wrong: a name, an option, a file or an environment that cannot serve."""
+
+
+def shown(value: Any) -> str:
+    """A value as messages show it: in one line, and not at length."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:

@@ -10,6 +10,7 @@ from qbumpers.compilation import uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.vector import Stepper, VectorTask
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.tabular import QValues, check_width
 
 Policy = Callable[[np.ndarray, int], int]
@@ -182,6 +183,7 @@ def play_several(
             f"episodes = {episodes}, random_start = {random_start}, seed = {seed}, epsilon = "
             f"{epsilon}; at least 1, 0, 0 and a number in [0, 1] are needed"
         )
+    check_fit(values, use_at(task))
     stepper = task.make_stepper()
     played = []
     for number in range(episodes):

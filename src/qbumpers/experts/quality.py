@@ -21,6 +21,7 @@ from qbumpers.experts.episodes import Episode, Policy, epsilon_greedy, greedy, p
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.vector import Stepper, VectorTask
 from qbumpers.values.exact import reachable_states, solve
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.tabular import QValues, check_width
 
 BEFORE_CRASH = (1, 2, 3, 5, 10, 20, 40)
@@ -121,6 +122,7 @@ def check_values(
             "number in (0, 1] are needed"
         )
     generator = np.random.default_rng(seed)
+    check_fit(values, use_at(task))
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
     if policies is None:
         policies = default_policies(task, values, generator)
@@ -277,6 +279,7 @@ def check_table(task: TabularTask, values: QValues, *, discount: float) -> pl.Da
     """
     exact = solve(task, discount).table
     states = np.flatnonzero(reachable_states(task))
+    check_fit(values, use_at(task))
     claimed = np.stack([check_width(values(int(s)), task.actions, f"in state {s}") for s in states])
     return pl.DataFrame(
         {

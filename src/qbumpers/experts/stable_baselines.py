@@ -86,6 +86,7 @@ def from_stable_baselines(model: Any, task: VectorTask, statistics: Any = None) 
         discount=float(model.gamma),
         task=task.name,
         method=method,
+        made_for=task.identity(),
     )
     if normalisation is not None:
         _check_folded(where, model, task, normalisation, values)

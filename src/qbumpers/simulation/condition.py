@@ -16,6 +16,7 @@ from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.others import further_values
 
 _FIRST_LEARNERS = ("q-learning", "double-dqn")  # what these seed does not name them
@@ -259,6 +260,7 @@ def _checked_values(
     if not task.states:
         return _checked_network(task, assistant, values)
     source: Any = solve(task) if values is None else values
+    check_fit(source, use_at(task))
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
     for place, name in enumerate(assistant.values):
@@ -282,19 +284,15 @@ def _table(task: Task, source: Any, name: str) -> np.ndarray:
 def _checked_network(
     task: Task, assistant: Assistant, values: QValues | None
 ) -> tuple[Any, Any, float]:
+    if values is not None:
+        check_fit(values, use_at(task))
     if not isinstance(values, NetworkValues):
+        given = "None" if values is None else f"a {type(values).__name__}"
         raise RequestError(
-            f"values = {values!r}; task {task.name} cannot be solved exactly: give a network's "
+            f"values = {given}; task {task.name} cannot be solved exactly: give a network's "
             "values, for instance of load_values or train_expert"
         )
     others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    for network in (values, *others):
-        found = (network.inputs, network.actions)
-        if found != (task.observation_size, task.actions):
-            raise RequestError(
-                f"values of {network.task}: a network of {found[0]} inputs and {found[1]} actions; "
-                f"task {task.name} needs {task.observation_size} and {task.actions}"
-            )
     for network in others:
         if network.layout != values.layout:
             raise RequestError(

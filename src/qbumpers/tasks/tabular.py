@@ -25,6 +25,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import distance_between
 
 
@@ -155,6 +156,14 @@ class TabularTask:
         """A SHA-256 of everything that decides how the task behaves."""
         parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
         return hashlib.sha256(b"|".join([*parts, *self._optional_parts()])).hexdigest()
+
+    def identity(self) -> str:
+        """A SHA-256 of what Q* depends on beside the discount, and of what is seen of states."""
+        transitions = transitions_digest(self.dynamics())
+        if self.seen is None:
+            return transitions
+        seen = np.asarray(self.seen, np.int64).tobytes()
+        return hashlib.sha256(transitions.encode() + seen).hexdigest()
 
     def _optional_parts(self) -> list[bytes]:
         """What is part of the digest only if it is stated: digests of tasks without it stay."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks.identity import transitions_digest
 from qbumpers.values.tabular import TabularValues
 
 DECIMALS = 9
@@ -51,6 +52,7 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
         discount=discount,
         task=task.name,
         method="exact dynamic programming",
+        made_for=transitions_digest(tabular.dynamics()),
     )
 
 
