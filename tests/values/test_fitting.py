@@ -17,13 +17,16 @@ from qbumpers import (
     make_task,
     simulate,
     solve,
+    train_expert,
 )
 from qbumpers.decisions import Model
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.sources import make_experiment
 from qbumpers.experts import check_expert
+from qbumpers.experts.correcting import correct_values
 from qbumpers.experts.loading import load_table
 from qbumpers.experts.quality import check_table
+from qbumpers.experts.tables import check_exactness
 from qbumpers.session import Session
 from qbumpers.values import learn_values
 from tests.tasks.examples import random_task
@@ -95,6 +98,36 @@ def test_values_in_their_place_are_taken(host):
     host(POLE, dataclasses.replace(NETWORK, made_for=POLE.identity()))
 
 
+@pytest.mark.parametrize("values", [solve(SMALL).table, "values.npz", 7])
+def test_what_is_no_function_is_refused(values):
+    message = r"values = .* a table \[16, 4\] is needed for task .*: TabularValues makes it of an"
+    with pytest.raises(RequestError, match=message) as caught:
+        in_a_simulation(SMALL, values)
+    assert "\n" not in str(caught.value)
+    if not isinstance(values, str):  # the path of a file will do there
+        with pytest.raises(RequestError, match="is needed for environment FrozenLake-v1"):
+            SharedControl(frozen(), "maximal", values, discount=0.9)
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: train_expert(SMALL), "FrozenLake-v1 has numbered states and a table"),
+        (lambda: check_expert(SMALL, solve(SMALL)), "FrozenLake-v1 has numbered states and a"),
+        (lambda: correct_values(SMALL, solve(SMALL)), "a table; only a network can be corrected"),
+        (
+            lambda: correct_values(POLE, solve(SMALL)),
+            r"a table \[16, 4\]; task CartPole-v1 needs a",
+        ),
+        (lambda: check_exactness(POLE, NETWORK), "task CartPole-v1 has no table of transitions"),
+    ],
+)
+def test_what_a_kind_of_task_cannot_do_is_said(ask, message):
+    with pytest.raises(RequestError, match=message) as caught:
+        ask()
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("name", ["too many states", "too few states", "another map", "a network"])
 def test_misplaced_files_are_refused(name, tmp_path):
     task, values, message = MISPLACED[name]
@@ -142,7 +175,9 @@ def test_a_session_and_its_values_agree_on_the_discount():
 
 @pytest.mark.parametrize("observation", [-1, 16, 3.0, "3", None, np.eye(16)[3], np.eye(99), (0, 3)])
 def test_what_is_no_number_of_a_state_is_refused_by_a_table(observation):
-    with pytest.raises(RequestError, match=r"is not the number of a state; .* 16 states") as caught:
+    with pytest.raises(
+        RequestError, match=r"is not the number of a state; .* has 16 states"
+    ) as caught:
         solve(SMALL)(observation)
     assert "\n" not in str(caught.value)
     assert np.array_equal(solve(SMALL)(np.int64(3)), solve(SMALL).table[3])

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, shown
 from qbumpers.tasks.checking import check_rows
 from qbumpers.tasks.wrapping import followed_reward, step_limit
 
@@ -143,7 +144,12 @@ def description_of(environment: Any, episode_limit: int | None) -> Description:
         RequestError: if it has no table or no limit is known, a wrapper cannot be followed, or its
             spaces are not the table's.
     """
-    inner = environment.unwrapped
+    if not isinstance(environment, gymnasium.Env):
+        raise RequestError(
+            f"environment = {shown(environment)}; a Gymnasium environment is needed, for instance "
+            "of gymnasium.make"
+        )
+    inner: Any = environment.unwrapped
     name = environment.spec.id if environment.spec else type(inner).__name__
     table = getattr(inner, "P", None)
     start = getattr(inner, "initial_state_distrib", None)

@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.wrappers import TimeLimit
 
+from qbumpers.errors import RequestError
 from qbumpers.tasks.agreement import check_agreement
 from qbumpers.tasks.checking import check_arrays, check_cells, check_common
 from qbumpers.tasks.construction import (
@@ -150,6 +151,17 @@ class TabularTask:
             start_states=starts,
             start_cumulative=_cumulative(self.start[starts]),
             episode_limit=int(self.episode_limit),
+        )
+
+    def make_stepper(self) -> Any:
+        """Refused: it has a table in the place of a stepper.
+
+        Raises:
+            RequestError: always.
+        """
+        raise RequestError(
+            f"task {self.name} has numbered states and a table of transitions: its values are "
+            "solved exactly, see solve, and compared so, see check_exactness"
         )
 
     def digest(self) -> str:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, shown
 from qbumpers.tasks.construction import description_of
 from qbumpers.tasks.identity import (
     environment_digest,
@@ -100,6 +100,12 @@ def check_fit(values: Any, use: Use) -> None:
     Raises:
         RequestError: if the kind, a size, or what they were made for differs.
     """
+    if not callable(values):
+        raise RequestError(
+            f"values = {shown(values)}; {use.needs()} is needed for {use.name}: TabularValues makes "
+            "it of an array, load_values of a file; any function will do that gives one value per "
+            "action"
+        )
     fit = getattr(values, "check_fit", None)
     if fit is not None:
         fit(use)

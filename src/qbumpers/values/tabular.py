@@ -114,8 +114,8 @@ class TabularValues:
             state = -1
         if not 0 <= state < len(self.table):  # -1 would be taken for the last state
             raise RequestError(
-                f"values of {self.task}: {shown(observation)} is not the number of a state; they are "
-                f"a table of {len(self.table)} states, from 0 on"
+                f"values of {self.task}: {shown(observation)} is not the number of a state; their "
+                f"table has {len(self.table)} states, from 0 on"
             )
         return self.table[state]
 
