@@ -102,9 +102,9 @@ def check_fit(values: Any, use: Use) -> None:
     """
     if not callable(values):
         raise RequestError(
-            f"values = {shown(values)}; {use.needs()} is needed for {use.name}: TabularValues makes "
-            "it of an array, load_values of a file; any function will do that gives one value per "
-            "action"
+            f"values = {shown(values)}; {use.needs()} is needed for {use.name}: TabularValues "
+            "makes it of an array, load_values of a file; any function will do that gives one "
+            "value per action"
         )
     fit = getattr(values, "check_fit", None)
     if fit is not None:
