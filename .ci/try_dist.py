@@ -1,7 +1,7 @@
 """Try a built distribution as its users will: `python .ci/try_dist.py dist`.
 
-Looks at what is in it, installs the wheel into a fresh environment of every Python here that it claims to be for,
-and runs a small demo from there, outside the checkout.
+Looks at what is in it, installs the wheel into a fresh environment of every Python here that it is
+made for, and runs a small demo from there, outside the checkout.
 """
 
 import concurrent.futures

@@ -1,11 +1,12 @@
 """The Gymnasium wrapper: which action is executed, and what is recorded about it."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from qbumpers import SharedControl, make_task, register_assistant, solve
+from qbumpers import RequestError, SharedControl, make_task, register_assistant, solve
 from qbumpers.tasks import TabularEnvironment
 from tests.assistants.own_rules import BudgetOptions, full_budget, guide_within_budget, spend
 from tests.narrowing import of_kind
@@ -268,8 +269,11 @@ def test_a_rule_remembers_from_one_episode_to_the_next(own_registry):
     assert [step[1] for step in third[1:]] == [-100.0] * 20  # nothing is left of it
 
 
-def test_values_may_be_those_of_another_task_of_the_same_shape():
+def test_values_may_be_those_of_another_task_of_the_same_shape_if_that_is_said():
     other = solve(make_task("FrozenLake-v1", discount=0.95, is_slippery=False))
+    with pytest.raises(RequestError, match="made for a task that differs from environment Frozen"):
+        skating("maximal", other)
+    other = dataclasses.replace(other, made_for="")
     returned = play(skating("maximal", other), [LEFT] * 100, seed=0)
     for record in records(returned):
         assert record["values"][record["executed"]] == record["values"].max()

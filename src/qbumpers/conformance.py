@@ -154,7 +154,10 @@ class _Recorded(gymnasium.Env[Any, Any]):
 
     def __init__(self, condition: Condition, steps: Step) -> None:
         self.task = condition.task
-        self.observation_space = condition.task.observation_space
+        # A record counts states and actions from 0.
+        states = condition.task.states
+        vectors: Any = condition.task.observation_space
+        self.observation_space = spaces.Discrete(states) if states else vectors
         self.action_space = spaces.Discrete(condition.task.actions)
         self._steps, self._next = list(rows_of(steps)), 0
 

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from pydantic import ValidationError
 
 
+_LONGEST_SHOWN = 80
+
+
 class RequestError(ValueError):
     """The request was wrong: a name, an option, a file or an environment that cannot serve."""
 

@@ -32,7 +32,9 @@ from qbumpers.errors import RequestError, action_number
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
-from qbumpers.values import QValues, check_callable, check_width
+from qbumpers.tasks.identity import transitions_digest
+from qbumpers.values import QValues, check_width
+from qbumpers.values.fitting import Use, check_fit
 from qbumpers.values.others import further_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
@@ -64,7 +66,9 @@ class Session:
             between episodes.
 
     Raises:
-        RequestError: if the perception is unknown, or the values lack rows that the rule named.
+        RequestError: if the perception is unknown, the values lack rows that the rule named, or
+            what they say of themselves (sizes, discount, what they were made for) is not what the
+            model says.
     """
 
     def __init__(
@@ -74,8 +78,14 @@ class Session:
         model: Model,
         perceived: Perception | str = "transition",
     ) -> None:
-        check_callable(values)
         self.assistant, self.values, self.model = assistant, values, model
+        check_fit(values, _use_of(model, values))
+        stated = getattr(values, "discount", None)
+        if stated is not None and stated != model.discount:
+            raise RequestError(
+                f"discount = {model.discount!r} of the model, but the values were made with "
+                f"{stated!r}"
+            )
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
         self._others = [further_values(values, name, assistant.name) for name in assistant.values]
@@ -185,6 +195,14 @@ class Session:
             others[place] = check_width(further(state), actions, where)
         row.flags.writeable = others.flags.writeable = False
         return row, others
+
+
+def _use_of(model: Model, values: Any) -> Use:
+    """What a model says of what values are put to."""
+    use = Use("the model", model.states, model.observation_size, model.actions)
+    if model.dynamics is None or not getattr(values, "made_for", ""):
+        return use
+    return use._replace(identity=transitions_digest(model.dynamics))
 
 
 def _as_state(state: Any) -> Any:

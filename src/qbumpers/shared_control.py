@@ -14,8 +14,10 @@ from qbumpers.errors import RequestError, action_number, check_number
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
+from qbumpers.tasks.identity import task_inside
 from qbumpers.tasks.undoing import reached_limit, undo_of
-from qbumpers.values import QValues, load_values
+from qbumpers.values import QValues, TabularValues, load_values
+from qbumpers.values.fitting import check_fit, use_in
 
 RECORD, SUMMARY = "assistance", "assisted_episode"
 """Keys of `info`: the record of every step, and the summary at the end of an episode."""
@@ -35,6 +37,10 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     the environment's chances are the same with and without an assistant. Recorded noise can be
     played again: `reset(options={"noise": [(coin, tie), ...]})`.
 
+    What values say of themselves is compared with the environment: sizes, and what they were made
+    for. Tables and rules count states and actions from 0, whatever the environment's spaces start
+    with; a function gets the observation as it is.
+
     Args:
         env: an environment with a Discrete action space.
         assistant: an assistant, or the name of one, its options then being given by `options`.
@@ -46,7 +52,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
 
     Raises:
         RequestError: if the action space is not Discrete, an argument is unknown, missing or out of
-            range, or the environment lacks what the assistant needs. `reset` raises it if the
+            range, the environment lacks what the assistant needs, or the values state sizes or a
+            task that are not the environment's. `reset` raises it if the
             values do not fit the environment or the assistant's options do not suit the episode.
     """
 
@@ -82,20 +89,31 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self.perception = perception
         self._actions = int(env.action_space.n)
         self._first_action = int(env.action_space.start)
+        shown = env.observation_space
+        discrete = isinstance(shown, gymnasium.spaces.Discrete)
+        self._first_state = int(shown.start) if discrete else 0
         self._generator = np.random.Generator(np.random.SFC64())
         self._noise: list[list[float]] = []
         self._recorded: list[list[float]] | None = None
         self._undo = undo_of(env) if "undo" in self.assistant.needs else None
-        self._session = Session(self.assistant, self.values, self._model(), perception)
+        model = self._model()
+        name = str(env.spec.id if env.spec else env)
+        check_fit(
+            self.values,
+            use_in(env, name, model.states, model.observation_size, self.values),
+        )
+        values = _from_zero(self.values, self._first_state)
+        self._session = Session(self.assistant, values, model, perception)
 
     def _model(self) -> Model:
         """What the rule may know of the environment: more if it is made from a task."""
-        task = getattr(self.env.unwrapped, "task", None)
+        task = task_inside(self.env)
         space = self.env.observation_space
         discrete = isinstance(space, gymnasium.spaces.Discrete)
+        shape = () if discrete or space.shape is None else space.shape
         model = Model(
             states=int(space.n) if discrete else 0,
-            observation_size=0 if discrete else int(np.prod(space.shape or (0,))),
+            observation_size=int(shape[0]) if len(shape) == 1 else 0,
             actions=self._actions,
             no_op=-1 if task is None else task.no_op,
             discount=self.discount,
@@ -124,7 +142,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._recorded = None if recorded is None else _checked_noise(recorded)
         self._session.values_now = None
         observation, info = self.env.reset(seed=seed, options=options or None)
-        self._session.begin(observation)
+        self._session.begin(self._number(observation))
         self._observation, self._total, self._overrides = observation, 0.0, 0
         account, row = self._session.account, np.array(self._session.values_now)
         state = self._session.state
@@ -132,7 +150,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, row,
             account.start_value, 0.0, state, 0,
         )  # fmt: skip
-        return observation, {**info, RECORD: first._asdict()}
+        return observation, {**info, RECORD: self._shown_state(first)._asdict()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
@@ -157,7 +175,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             self._take_back(before)
             terminated, truncated = False, bool(events & LIMIT)
         notice = self._notice(decision.action != proposed or decision.undo)
-        step = session.record(reward, observation, events, notice)
+        step = session.record(reward, self._number(observation), events, notice)
         observation = self._observation if decision.undo else observation
         self._observation = observation
         self._total += reward
@@ -166,6 +184,10 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         if terminated or truncated:
             info[SUMMARY] = self._summary(step)
         return observation, reward, terminated, truncated, info
+
+    def _number(self, observation: Any) -> Any:
+        """The number of a state, from 0; other observations as they are."""
+        return observation - self._first_state if self._first_state else observation
 
     def _next_noise(self) -> Noise:
         if self._recorded is not None:
@@ -199,8 +221,9 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._undo[1](before)
 
     def _shown(self, step: Step) -> Step:
-        """A record of its own for the caller, with actions as the environment numbers them."""
-        step, first = step._replace(values=step.values.copy()), self._first_action
+        """A record of its own for the caller, numbered as the environment numbers."""
+        step = self._shown_state(step._replace(values=step.values.copy()))
+        first = self._first_action
         if not first:
             return step
         return step._replace(
@@ -208,6 +231,12 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             executed=step.executed + first,
             credited=step.credited + first if step.credited >= 0 else -1,
         )
+
+    def _shown_state(self, step: Step) -> Step:
+        first = self._first_state
+        if not first:
+            return step
+        return step._replace(state=step.state + first, next_state=step.next_state + first)
 
     def _summary(self, last: Step) -> dict[str, Any]:
         account = self._session.account
@@ -218,6 +247,23 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             "start_value": account.start_value,
             "projected_return": last.projected_return,
         }
+
+
+class _FromZero:
+    """A function of observations, for a session that counts states from 0."""
+
+    def __init__(self, values: Any, first: int) -> None:
+        self._values, self._first = values, first
+        others = getattr(values, "others", {})
+        self.others = {name: _FromZero(each, first) for name, each in others.items()}
+
+    def __call__(self, state: Any, /) -> Any:
+        return self._values(state + self._first)
+
+
+def _from_zero(values: QValues, first: int) -> QValues:
+    """Values of states that count from 0; a table's do already."""
+    return values if not first or isinstance(values, TabularValues) else _FromZero(values, first)
 
 
 def _checked_noise(noise: Any) -> list[list[float]]:

@@ -7,9 +7,15 @@ import pytest
 import qbumpers
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
+from qbumpers.experiments.local import ThisMachine
+from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.recordings import INFOS, _episodes, export_recording
+from qbumpers.experiments.run import run_experiment
+from qbumpers.experiments.sources import make_experiment
+from qbumpers.tasks import registry
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from tests.experiments.examples import run_into
+from tests.tasks.lakes import Tabled
 
 minari = pytest.importorskip("minari")
 
@@ -121,3 +127,34 @@ def test_what_cannot_be_exported_is_named(recorded, tmp_path, monkeypatch, chang
     with pytest.raises(RequestError, match=message):
         export_recording(recorded[0], **arguments)
     assert list(tmp_path.rglob("*.hdf5")) == []
+
+
+def test_states_and_actions_are_numbered_as_in_the_environment(tmp_path, monkeypatch):
+    """Whose actions are 2, 3 and 4 and whose states begin with 7: its table has every step."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    monkeypatch.setattr(registry, "_tasks", dict(registry._tasks))
+    environment = Tabled(3, first_state=7, first_action=2)
+    task = qbumpers.TabularTask.from_gymnasium(environment, discount=0.9, episode_limit=20)
+    qbumpers.register_task("numbered", lambda: task)
+    experiment = {"name": "numbered", "task": "numbered", "trials": 1, "episodes": 4,
+                  "assistants": [{"name": "maximal"}]}  # fmt: skip
+    plan = make_plan(make_experiment(experiment))
+    run_experiment(plan, tmp_path / "out", backend=ThisMachine(1))
+    export_recording(tmp_path / "out", "maximal", "numbered/maximal-v0")
+    dataset = minari.load_dataset("numbered/maximal-v0")
+    assert dataset.action_space == environment.action_space
+    assert dataset.observation_space == environment.observation_space
+    steps = 0
+    for number in range(dataset.total_episodes):
+        episode = dataset[number]
+        for state, action, to, reward, ended in zip(
+            episode.observations, episode.actions, episode.observations[1:], episode.rewards,
+            episode.terminations, strict=False,
+        ):  # fmt: skip
+            rows = environment.P[int(state)][int(action)]
+            assert any(row[1:] == (to, reward, ended) for row in rows)
+            steps += 1
+        infos = episode.infos
+        assert set(infos["proposed"][1:]) | set(infos["credited"][1:]) <= {2, 3, 4}
+        assert (infos["proposed"][0], infos["credited"][0]) == (-1, -1)
+    assert steps > 10

@@ -27,13 +27,19 @@ def test_values_that_do_not_suit_the_task_are_refused(tmp_path):
         "acrobot": network_of(inputs=4, actions=2, task="Acrobot-v1"),
     }.items():
         values.save(tmp_path / f"{name}.npz")
-    with pytest.raises(RequestError, match=r"table.npz: a table; task CartPole-v1 needs a network"):
+    with pytest.raises(
+        RequestError, match=r"table.npz: .*\[48, 4\]; task CartPole-v1 needs a network"
+    ):
         load_network(POLE, tmp_path / "table.npz")
-    with pytest.raises(RequestError, match="5 inputs and 2 actions; task CartPole-v1 has 4 and 2"):
+    with pytest.raises(
+        RequestError, match=r"5 inputs and 2 actions; task CartPole-v1 needs .* 4 inputs"
+    ):
         load_network(POLE, tmp_path / "wide.npz")
     with pytest.raises(RequestError, match="of task Acrobot-v1"):
         load_network(POLE, tmp_path / "acrobot.npz")
-    with pytest.raises(RequestError, match=r"wide.npz: a network; .* needs a table \[48, 4\]"):
+    with pytest.raises(
+        RequestError, match=r"wide.npz: .* a network of 5 .* needs a table \[48, 4\]"
+    ):
         load_table(CLIFF, tmp_path / "wide.npz")
     with pytest.raises(RequestError, match=r"a table \[500, 6\]; task cliff-walking needs"):
         load_table(CLIFF, tmp_path / "taxi.npz")

@@ -10,7 +10,13 @@ import torch
 from gymnasium import spaces, wrappers
 from gymnasium.envs.registration import EnvSpec
 from stable_baselines3 import DQN, PPO
-from stable_baselines3.common.vec_env import DummyVecEnv, VecFrameStack, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import (
+    DummyVecEnv,
+    SubprocVecEnv,
+    VecFrameStack,
+    VecMonitor,
+    VecNormalize,
+)
 
 from qbumpers.errors import RequestError
 from qbumpers.experts import ExpertWarning, from_stable_baselines
@@ -197,6 +203,15 @@ def test_what_a_models_own_file_does_not_say_is_said(task, normalised_model, tmp
     later = DQN.load(tmp_path / "model.zip", env=pole())
     with pytest.warns(ExpertWarning, match=NOT_KNOWN):
         from_stable_baselines(later, task)
+
+
+def test_environments_in_other_processes_cannot_be_looked_at(task):
+    environments = SubprocVecEnv([pole], start_method="fork")
+    try:
+        with pytest.warns(ExpertWarning, match=NOT_KNOWN):
+            from_stable_baselines(trained(environment=environments), task)
+    finally:
+        environments.close()
 
 
 def test_statistics_of_gymnasium_become_part_too(task, observations):

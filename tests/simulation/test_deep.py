@@ -262,7 +262,9 @@ def test_values_must_suit_the_task():
     with pytest.raises(RequestError, match="cannot be solved exactly"):
         in_the_corridor(values=None)
     wide = dataclasses.replace(guide(), inputs=2, parameters=np.zeros(6))
-    with pytest.raises(RequestError, match=r"2 inputs and 2 actions; task corridor needs 3 and 2"):
+    with pytest.raises(
+        RequestError, match="of 2 inputs and 2 actions; task corridor needs a network of 3"
+    ):
         in_the_corridor(values=wide)
 
 

@@ -114,6 +114,13 @@ def test_an_environment_without_a_table_is_refused():
         TabularTask.from_gymnasium(gymnasium.make("CartPole-v1"), discount=0.9)
 
 
+def test_the_id_of_an_environment_is_none():
+    with pytest.raises(
+        RequestError, match="environment = 'FrozenLake-v1'; a Gymnasium environment"
+    ):
+        TabularTask.from_gymnasium("FrozenLake-v1", discount=0.9)
+
+
 def test_an_environment_without_a_start_is_refused():
     lake = FrozenLakeEnv()
     del lake.initial_state_distrib

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import polars as pl
 
@@ -33,10 +32,11 @@ def export_recording(
     """Play trials of a finished run again and keep every training step as a Minari dataset.
 
     Observations are numbers of states [N + 1], or vectors [N + 1, D]; actions are the executed ones
-    [N]. `infos` has the same keys in every episode, `INFOS` with `trial` and `episode`, as arrays
-    [N + 1]: one entry for the reset, where numbers are -1 or NaN, and one per step. After a step
-    that was undone, the observation is the one before it. Episodes in which the assistant is gone
-    are there too, with probability 0.
+    [N]. Both are numbered as the environment that the task was made from numbers them. `infos` has
+    the same keys in every episode, `INFOS` with `trial` and `episode`, as arrays [N + 1]: one entry
+    for the reset, where numbers are -1 or NaN, and one per step. After a step that was undone, the
+    observation is the one before it. Episodes in which the assistant is gone are there too, with
+    probability 0.
 
     Q* and the files that options name are those that the folder keeps, and what is played is
     compared with the run.
@@ -73,7 +73,9 @@ def export_recording(
     episodes = [
         episode
         for trial in which
-        for episode in _episodes(trial, record(chosen, trial=trial, seed=seed))
+        for episode in _episodes(
+            trial, as_environment_counts(record(chosen, trial=trial, seed=seed), chosen.task)
+        )
     ]
     _check_same(results.episodes.filter(condition=condition), episodes)
     _write(dataset, condition, chosen.task, episodes)
@@ -95,6 +97,24 @@ def _check_same(run: pl.DataFrame, episodes: Sequence[Mapping[str, Any]]) -> Non
                 f"{total:g} and was {then[0]:g}, with {now[1]} overrides in {now[0]} steps and "
                 f"{then[2]} in {then[1]}; the code, the task or a library changed since"
             )
+
+
+def as_environment_counts(steps: Step, task: Task) -> Step:
+    """Steps with states and actions counted from the starts of a task's spaces.
+
+    Args:
+        steps: a table, counted from 0.
+        task: that they are of.
+    """
+    action = int(task.action_space.start)
+    state = int(getattr(task.observation_space, "start", 0))  # vectors have none
+    return steps._replace(
+        state=steps.state + state,
+        next_state=steps.next_state + state,
+        proposed=steps.proposed + action,
+        executed=steps.executed + action,
+        credited=np.where(steps.credited < 0, -1, steps.credited + action),
+    )
 
 
 def _checked(trials: int | range, run: int) -> range:
@@ -119,7 +139,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
                 dataset,
                 [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
                 observation_space=task.observation_space,
-                action_space=gymnasium.spaces.Discrete(task.actions),
+                action_space=task.action_space,
                 algorithm_name=condition,
                 description=f"Simulated learners at {task.name}, assisted by {condition}.",
             )

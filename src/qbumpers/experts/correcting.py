@@ -25,6 +25,7 @@ from qbumpers.networks.network import Layout, named_parameters
 from qbumpers.random_streams import LEARNER, trial_streams
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.task import Task
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.network import NetworkValues
 
 BRANCHES = 6_000
@@ -106,6 +107,9 @@ def correct_values(
     Raises:
         RequestError: if a number is out of range, or the network is a dueling one.
     """
+    if task.states:
+        raise RequestError(f"task {task.name}: only networks are corrected, not tables of states")
+    check_fit(values, use_at(task))
     if values.network.dueling:
         raise RequestError(
             f"values of {values.task}: a dueling network; only plain ones can be corrected"

@@ -11,6 +11,7 @@ from qbumpers.errors import RequestError
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.task import Task
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.tabular import QValues, check_width
 
 Policy = Callable[[np.ndarray, int], int]
@@ -188,6 +189,7 @@ def play_several(
             f"episodes = {episodes}, random_start = {random_start}, seed = {seed}, epsilon = "
             f"{epsilon}; at least 1, 0, 0 and a number in [0, 1] are needed"
         )
+    check_fit(values, use_at(task))
     stepper = task.make_stepper()
     played: list[Episode] = []
     for number in range(episodes):

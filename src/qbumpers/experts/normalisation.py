@@ -101,16 +101,26 @@ def _normalisation(holder: Any, clip: float, where: str) -> Normalisation:
     return Normalisation(mean, np.sqrt(variance + holder.epsilon), float(clip))
 
 
-def statistics_in_training(model: Any, own: list[str], where: str) -> Any:
-    """The statistics that a model was trained with, as far as its environment is known.
+class Training(NamedTuple):
+    """What is known of the environment that a model was trained in.
+
+    Attributes:
+        statistics: of normalised observations, as `normalisation_of` takes them; None if there are
+            none.
+        known: whether all of it could be looked at, and it is the one of the training.
+    """
+
+    statistics: Any
+    known: bool
+
+
+def training_of(model: Any, own: list[str], where: str) -> Training:
+    """What is known of the environment that a model was trained in.
 
     Args:
         model: of Stable-Baselines3.
         own: names of the wrappers that the task itself has, from the outside in.
         where: for messages.
-
-    Returns:
-        What `normalisation_of` takes; None if there are none.
 
     Raises:
         RequestError: naming a wrapper whose effect cannot become part of a network.
@@ -126,7 +136,8 @@ def statistics_in_training(model: Any, own: list[str], where: str) -> Any:
         elif not isinstance(layer, harmless):
             raise _other_wrapper(type(layer).__name__, where)
         layer = layer.venv
-    environments = getattr(layer, "envs", [])  # those in other processes cannot be looked at
+    # Those in other processes cannot be looked at, nor those of a model from a file.
+    environments = getattr(layer, "envs", [])
     for environment in environments:
         around = altering_wrappers(environment)
         if around and type(around[0]) is NormalizeObservation and len(environments) == 1:
@@ -137,7 +148,9 @@ def statistics_in_training(model: Any, own: list[str], where: str) -> Any:
             raise _other_wrapper(" and ".join(differing), where)
     if len(found) > 1:
         raise RequestError(f"{where}: its observations were normalised twice")
-    return found[0] if found else None
+    # An environment that was given to a model from a file is not the one of its training.
+    trained_there = model.num_timesteps == 0 or model.replay_buffer.size() > 0
+    return Training(found[0] if found else None, bool(environments) and trained_there)
 
 
 def _other_wrapper(name: str, where: str) -> RequestError:

@@ -22,6 +22,7 @@ from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task
 from qbumpers.values.exact import reachable_states, solve
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.tabular import QValues, check_width
 
 BEFORE_CRASH = (1, 2, 3, 5, 10, 20, 40)
@@ -122,6 +123,7 @@ def check_values(
             "number in (0, 1] are needed"
         )
     generator = np.random.default_rng(seed)
+    check_fit(values, use_at(task))
     stepper, best = task.make_stepper(), greedy(values, task.actions, generator)
     if policies is None:
         policies = default_policies(task, values, generator)
@@ -279,6 +281,7 @@ def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame
     """
     exact = solve(task, discount).table
     states = np.flatnonzero(reachable_states(cast(TabularTask, task)))
+    check_fit(values, use_at(task))
     claimed = np.stack([check_width(values(int(s)), task.actions, f"in state {s}") for s in states])
     return pl.DataFrame(
         {

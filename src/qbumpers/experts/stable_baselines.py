@@ -17,7 +17,7 @@ from qbumpers.experts.episodes import play_several
 from qbumpers.experts.normalisation import (
     Normalisation,
     normalisation_of,
-    statistics_in_training,
+    training_of,
 )
 from qbumpers.experts.unreadable import why_unreadable
 from qbumpers.networks.network import Network
@@ -89,6 +89,7 @@ def from_stable_baselines(model: Any, task: Task, statistics: Any = None) -> Net
         discount=float(model.gamma),
         task=task.name,
         method=method,
+        made_for=task.identity(),
     )
     if normalisation is not None:
         _check_folded(where, model, task, normalisation, values)
@@ -101,11 +102,8 @@ def _normalisation(where: str, model: Any, task: Task, statistics: Any) -> Norma
         space = environment.observation_space
         own = [type(layer).__name__ for layer in altering_wrappers(environment)]
     _check_sizes(where, model, task)
-    # Its environment is the one of its training only if it has taken steps there.
-    trained_there = model.num_timesteps == 0 or model.replay_buffer.size() > 0
-    known = model.get_env() is not None and trained_there
-    found = statistics_in_training(model, own, where) if model.get_env() is not None else None
-    if found is None and statistics is None and not known:
+    training = training_of(model, own, where)
+    if training.statistics is None and statistics is None and not training.known:
         warnings.warn(
             f"{where}: it is not known whether it saw normalised observations or rewards: "
             "VecNormalize keeps that in a file of its own; if it did, give that file as statistics",
@@ -113,7 +111,7 @@ def _normalisation(where: str, model: Any, task: Task, statistics: Any) -> Norma
             stacklevel=3,
         )
     normalisation = None
-    for each in (found, statistics):
+    for each in (training.statistics, statistics):
         normalisation = normalisation if each is None else normalisation_of(each, where)
     if normalisation is not None and normalisation.mean.shape != (task.observation_size,):
         raise RequestError(

@@ -87,6 +87,7 @@ def train_expert(
         discount=learner.discount,
         task=task.name,
         method=recipe.words(seed),
+        made_for=task.identity(),
     )
 
 

@@ -9,7 +9,8 @@ from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError, checked, in_short
 from qbumpers.learners import Motor, learner_for_settings, learner_type
 from qbumpers.tasks import Task
-from qbumpers.values import NetworkValues, QValues, check_callable, check_width, solve
+from qbumpers.values import NetworkValues, QValues, check_width, solve
+from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.others import further_values
 
 
@@ -30,7 +31,7 @@ def checked_values(
     if not task.states:
         return _checked_network(task, assistant, values)
     source: Any = solve(task) if values is None else values
-    check_callable(source)
+    check_fit(source, use_at(task))
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
     for place, name in enumerate(assistant.values):
@@ -54,16 +55,12 @@ def _table(task: Task, source: Any, name: str) -> np.ndarray:
 def _checked_network(
     task: Task, assistant: Assistant, values: QValues | None
 ) -> tuple[Any, Any, float]:
+    if values is not None:
+        check_fit(values, use_at(task))
     if not isinstance(values, NetworkValues):
         raise RequestError(
             f"values = {in_short(values)}; task {task.name} cannot be solved exactly: give a "
             "network's values, for instance of load_values or train_expert"
-        )
-    found = (values.inputs, values.actions)
-    if found != (task.observation_size, task.actions):
-        raise RequestError(
-            f"values of {values.task}: a network of {found[0]} inputs and {found[1]} actions; task "
-            f"{task.name} needs {task.observation_size} and {task.actions}"
         )
     # They have the shape of Q*, or there would be no such values.
     others = tuple(further_values(values, name, assistant.name) for name in assistant.values)

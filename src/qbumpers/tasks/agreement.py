@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 
 _STEPS = (1_000, 6_000)  # at least and at most
 _STEPS_A_PAIR = 64  # of a state and an action, if there are not too many of them
@@ -146,7 +146,7 @@ class _Comparison:
         """The number of an observed state, from 0."""
         found = np.asarray(observation)
         if found.ndim or found.dtype.kind not in "iu":
-            raise self._differs(f"it shows {observation!r}, which is no number of a state")
+            raise self._differs(f"it shows {in_short(observation)}, which is no number of a state")
         number = int(found) - self._task.first_state
         if not 0 <= number < self._task.states:
             raise self._differs(

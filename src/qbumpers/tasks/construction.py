@@ -3,11 +3,12 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 from qbumpers.tasks.checking import normalised_rows
 from qbumpers.tasks.wrapping import followed_reward, step_limit
 
@@ -148,7 +149,12 @@ def description_of(environment: Any, episode_limit: int | None) -> Description:
         RequestError: if it has no table or no limit is known, a wrapper cannot be followed, or its
             spaces are not the table's.
     """
-    inner = environment.unwrapped
+    if not isinstance(environment, gymnasium.Env):
+        raise RequestError(
+            f"environment = {in_short(environment)}; a Gymnasium environment is needed, for "
+            "instance of gymnasium.make"
+        )
+    inner: Any = environment.unwrapped
     name = environment.spec.id if environment.spec else type(inner).__name__
     table = getattr(inner, "P", None)
     start = getattr(inner, "initial_state_distrib", None)

@@ -4,7 +4,6 @@ import functools
 from typing import Any
 
 import gymnasium
-from gymnasium import spaces
 
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
@@ -15,7 +14,7 @@ from qbumpers.tasks.task import Task
 
 
 class TabularEnvironment(gymnasium.Env[Any, Any]):
-    """A tabular task to be stepped through; states and actions are numbers.
+    """A tabular task to be stepped through; states and actions are numbers, as its spaces count.
 
     `info` of every step has `success` and `crash`, false if the task does not know them. The step
     limit belongs to Gymnasium's TimeLimit (see `TabularTask.make_environment`), not to this class.
@@ -36,8 +35,9 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
             raise RequestError(f"task {task.name}: render_mode = {render_mode!r}; known: {known}")
         self.task = task
         self.render_mode = render_mode
-        self.observation_space = spaces.Discrete(task.states)
-        self.action_space = spaces.Discrete(task.actions)
+        space: Any = task.observation_space
+        self.observation_space, self._first_state = space, int(space.start)
+        self.action_space, self._first_action = task.action_space, int(task.action_space.start)
         self._dynamics = task.dynamics()
         self._state = 0
         self._last_step: Step | None = None
@@ -49,27 +49,33 @@ class TabularEnvironment(gymnasium.Env[Any, Any]):
         super().reset(seed=seed)
         self._state = int(first_state(self._dynamics, self.np_random.random()))
         self._last_step = None
-        return self._state, {"success": False, "crash": False}
+        return self._shown_state(), {"success": False, "crash": False}
+
+    def _shown_state(self) -> int:
+        return self._state + self._first_state
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take an action.
 
         Args:
-            action: in [0, A).
+            action: in [0, A), counted from the start of the action space.
 
         Returns:
             Next state, reward, terminated, False, and `info`.
         """
-        dynamics = self._dynamics
-        if not 0 <= action < dynamics.actions:
-            raise RequestError(f"action = {action!r}; it must lie in [0, {dynamics.actions})")
-        index = transition(dynamics, self._state, int(action), self.np_random.random())
+        dynamics, first = self._dynamics, self._first_action
+        if not first <= action < first + dynamics.actions:
+            raise RequestError(
+                f"action = {action!r}; it must lie in [{first}, {first + dynamics.actions})"
+            )
+        number = int(action) - first
+        index = transition(dynamics, self._state, number, self.np_random.random())
         before, reward = self._state, float(dynamics.reward[index])
         self._state = int(dynamics.next_state[index])
-        self._last_step = unassisted_step(before, int(action), reward, self._state)
+        self._last_step = unassisted_step(before, number, reward, self._state)
         events = int(dynamics.events[index])
         info = {"success": bool(events & SUCCESS), "crash": bool(events & CRASH)}
-        return self._state, reward, bool(events & TERMINATED), False, info
+        return self._shown_state(), reward, bool(events & TERMINATED), False, info
 
     def render(self) -> Any:
         """For "rgb_array" the picture of the state, uint8 [H, W, 3]; None without a mode."""

@@ -27,6 +27,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.stepping import Stepper
 from qbumpers.tasks.task import distance_between
 
@@ -160,19 +161,28 @@ class TabularTask:
         )
 
     def make_stepper(self) -> Stepper:
-        """Refused: its states are numbered.
+        """Refused: it has a table in the place of a stepper.
 
         Raises:
             RequestError: always.
         """
         raise RequestError(
-            f"task {self.name}: its states are numbered; observations that are vectors are needed"
+            f"task {self.name} has numbered states and a table of transitions: its values are "
+            "solved exactly, see solve, and compared so, see check_exactness"
         )
 
     def digest(self) -> str:
         """A SHA-256 of everything that decides how the task behaves."""
         parts = [np.asarray(part).tobytes() for part in (*self.dynamics(), float(self.discount))]
         return hashlib.sha256(b"|".join([*parts, *self._optional_parts()])).hexdigest()
+
+    def identity(self) -> str:
+        """A SHA-256 of what Q* depends on beside the discount, and of what is seen of states."""
+        transitions = transitions_digest(self.dynamics())
+        if self.seen is None:
+            return transitions
+        seen = np.asarray(self.seen, np.int64).tobytes()
+        return hashlib.sha256(transitions.encode() + seen).hexdigest()
 
     def _optional_parts(self) -> list[bytes]:
         """What is part of the digest only if it is stated: digests of tasks without it stay."""

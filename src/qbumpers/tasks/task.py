@@ -140,6 +140,10 @@ class Task(Protocol):
         """A SHA-256 of everything that decides how the task behaves."""
         ...
 
+    def identity(self) -> str:
+        """A SHA-256 of what Q* depends on beside the discount; values state it."""
+        ...
+
     def dynamics(self) -> Dynamics:
         """Its transitions, laid out for compiled loops.
 

@@ -15,6 +15,7 @@ from qbumpers.random_streams import content_digest
 from qbumpers.tasks.checking import check_common
 from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.dynamics import Dynamics
+from qbumpers.tasks.identity import environment_digest
 from qbumpers.tasks.stepping import (
     REVISION,
     GymnasiumStepper,
@@ -54,6 +55,7 @@ class VectorTask:
         implied: `no_op` and `action_distance` that follow from the name and the settings; any
             others are part of the digest.
         first_action: number that the environment gives to action 0.
+        origin: digest of the Gymnasium environment that it was made from; empty if there is none.
         make_display: makes `display` of the task; no part of its digest.
         stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
             classes and functions; and modules, for the versions of their libraries.
@@ -79,6 +81,7 @@ class VectorTask:
     action_distance: np.ndarray | None = None
     implied: tuple[int, np.ndarray | None] = (-1, None)
     first_action: int = 0
+    origin: str = ""
     make_display: Callable[["VectorTask"], Any] | None = None
     stepped_by: tuple[Any, ...] = ()
     revision: int = 1
@@ -175,6 +178,11 @@ class VectorTask:
             content["stated"] = stated
         return content_digest(content).hex()
 
+    def identity(self) -> str:
+        """A SHA-256 of the environment that it was made from, else of its name and settings."""
+        content = {"name": self.name, "settings": self.settings}
+        return self.origin or content_digest(content).hex()
+
     @classmethod
     def from_gymnasium(
         cls, name: str, *, discount: float, episode_limit: int | None = None, **arguments: Any
@@ -223,6 +231,7 @@ class VectorTask:
             has_crash="crash" in announced,
             undoable=undoable,
             first_action=int(environment.action_space.start),
+            origin=environment_digest(environment),
             make_display=display_maker(environment),
             stepped_by=stepped_by,
             revision=REVISION,
@@ -257,7 +266,7 @@ def _check_repeatable(name: str, environment: Any) -> None:
         blamed = f"; is it wrapper {' or '.join(around)}?" if around else ""
         raise RequestError(
             f"task {name!r}: an episode went another way when it was played again with the same "
-            f"seed and actions, so its numbers would hang on what was played before{blamed}"
+            f"seed and actions, so its numbers would depend on what was played before{blamed}"
         )
 
 

@@ -7,7 +7,6 @@ from qbumpers.values.shipped import shipped_expert
 from qbumpers.values.tabular import (
     QValues,
     TabularValues,
-    check_callable,
     check_width,
     decoded_values,
     load_values,
@@ -17,7 +16,6 @@ __all__ = [
     "NetworkValues",
     "QValues",
     "TabularValues",
-    "check_callable",
     "check_width",
     "decoded_values",
     "learn_values",

@@ -10,6 +10,7 @@ import numpy as np
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks import TabularTask, Task
+from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import check_task
 from qbumpers.values.tabular import TabularValues
 
@@ -56,6 +57,7 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
         discount=discount,
         task=task.name,
         method="exact dynamic programming",
+        made_for=transitions_digest(tabular.dynamics()),
     )
 
 

@@ -15,6 +15,7 @@ import qbumpers
 from qbumpers.errors import RequestError, checked
 from qbumpers.files import write_atomically
 from qbumpers.networks.network import Layout, Network, forward, named_parameters
+from qbumpers.values.fitting import Use, check_made_for
 from qbumpers.values.others import (
     arrays_of_others,
     check_others,
@@ -37,6 +38,7 @@ class NetworkValues:
         method: how they were made, in words.
         version: which version of the package made them.
         others: further values by name, of networks of the same shape, for rules that ask for them.
+        made_for: identity of the task that they were made for; empty if it is not known.
 
     Raises:
         RequestError: if the number of parameters does not suit the shape, one is not finite,
@@ -52,6 +54,7 @@ class NetworkValues:
     method: str
     version: str = qbumpers.__version__
     others: Mapping[str, "NetworkValues"] = field(default_factory=dict[str, "NetworkValues"])
+    made_for: str = ""
 
     def __post_init__(self) -> None:
         """Check everything and freeze the parameters."""
@@ -93,6 +96,22 @@ class NetworkValues:
         values = forward(self.layout, self.parameters, workspace, states).astype(np.float64)
         return values[0] if observations.ndim == 1 else values
 
+    def check_fit(self, use: Use) -> None:
+        """Compare them with what they are put to.
+
+        Args:
+            use: what that is.
+
+        Raises:
+            RequestError: if their sizes or their kind differ, or they were made for something else.
+        """
+        if use.rows or (self.inputs, self.actions) != (use.inputs, use.actions):
+            raise RequestError(
+                f"values of {self.task}: a network of {self.inputs} inputs and {self.actions} "
+                f"actions; {use.name} needs {use.needs()}"
+            )
+        check_made_for(self, use)
+
     def digest(self) -> str:
         """A SHA-256 of shape, parameters and discount: equal for values that decide alike."""
         shape = json.dumps([*self.network, self.inputs, self.actions, self.discount])
@@ -133,6 +152,7 @@ class NetworkValues:
             "method": self.method,
             "discount": self.discount,
             "version": self.version,
+            **({"made_for": self.made_for} if self.made_for else {}),
             **provenance_of_others(self.others),
         }
 

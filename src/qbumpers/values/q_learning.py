@@ -10,6 +10,7 @@ from qbumpers.learners.interface import Table, Transition
 from qbumpers.learners.q_learning import QLearner
 from qbumpers.random_streams import ENVIRONMENT, LEARNER, draw, trial_streams
 from qbumpers.tasks.dynamics import TERMINATED, Dynamics, first_state, transition
+from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import Task
 from qbumpers.values.tabular import TabularValues
 
@@ -49,6 +50,7 @@ def learn_values(
         discount=learner.discount,
         task=task.name,
         method=f"Q-learning, {episodes} episodes, seed {seed}",
+        made_for=transitions_digest(task.dynamics()),
     )
 
 

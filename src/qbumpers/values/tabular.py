@@ -4,6 +4,7 @@ import hashlib
 import io
 import json
 import math
+import operator
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ import numpy as np
 import qbumpers
 from qbumpers.errors import RequestError, in_short
 from qbumpers.files import write_atomically
+from qbumpers.values.fitting import Use, check_made_for
 from qbumpers.values.network import NetworkValues, network_values
 from qbumpers.values.others import (
     arrays_of_others,
@@ -55,10 +57,11 @@ class TabularValues:
         version: which version of the package made them.
         others: further values by name, of the same shape, for rules that ask for them; an array
             [S, A] will do.
+        made_for: identity of the task that they were made for; empty if it is not known.
 
     Raises:
-        RequestError: if a table is not two-dimensional or holds a number that is not finite, or
-            further values do not suit.
+        RequestError: if a table is not two-dimensional or holds a number that is not finite, the
+            discount is out of range, or further values do not suit.
     """
 
     table: np.ndarray
@@ -67,9 +70,14 @@ class TabularValues:
     method: str
     version: str = qbumpers.__version__
     others: Mapping[str, "TabularValues"] = field(default_factory=dict[str, "TabularValues"])
+    made_for: str = ""
 
     def __post_init__(self) -> None:
         """Check the table and freeze it."""
+        if not 0 < self.discount <= 1:
+            raise RequestError(
+                f"values of {self.task}: discount = {self.discount!r}; it must lie in (0, 1]"
+            )
         table = _numbers(self.table, f"values of {self.task}: table")
         if table.ndim != 2:
             raise RequestError(
@@ -97,14 +105,38 @@ class TabularValues:
         )
 
     def __call__(self, observation: Any, /) -> np.ndarray:
-        """Q*(s, .) as float64 [A]; the observation is the number of the state."""
+        """Q*(s, .) as float64 [A]; the observation is the number of the state, from 0.
+
+        Raises:
+            RequestError: if it is no such number.
+        """
         try:
-            return self.table[observation]
-        except IndexError as error:
+            state = operator.index(observation)
+        except TypeError:
+            state = -1
+        if not 0 <= state < len(self.table):  # -1 would be taken for the last state
             raise RequestError(
-                f"values of {self.task}: a table of {len(self.table)} states has no row for the "
-                f"observation {in_short(observation)}"
-            ) from error
+                f"values of {self.task}: {in_short(observation)} is not the number of a state; "
+                f"their table has {len(self.table)} states, from 0 on"
+            )
+        return self.table[state]
+
+    def check_fit(self, use: Use) -> None:
+        """Compare them with what they are put to.
+
+        Args:
+            use: what that is.
+
+        Raises:
+            RequestError: if they are too few, too many or of another kind, or were made for
+                something else.
+        """
+        if self.table.shape != (use.rows, use.actions):
+            raise RequestError(
+                f"values of {self.task}: a table {list(self.table.shape)}; {use.name} needs "
+                f"{use.needs()}"
+            )
+        check_made_for(self, use)
 
     def digest(self) -> str:
         """A SHA-256 of tables and discounts: equal for values that decide alike."""
@@ -143,6 +175,7 @@ class TabularValues:
             "method": self.method,
             "discount": self.discount,
             "version": self.version,
+            **({"made_for": self.made_for} if self.made_for else {}),
             **provenance_of_others(self.others),
         }
 
@@ -242,19 +275,6 @@ def _numbers(given: Any, what: str) -> np.ndarray:
         return np.array(given, np.float64)
     except (TypeError, ValueError) as error:
         raise RequestError(f"{what} = {in_short(given)}; an array of numbers is needed") from error
-
-
-def check_callable(values: Any) -> None:
-    """Check that values are what they must be, a callable.
-
-    Raises:
-        RequestError: if they are not.
-    """
-    if not callable(values):
-        raise RequestError(
-            f"values = {in_short(values)}; a callable from an observation to one value per action "
-            "is needed, for instance TabularValues or what load_values reads"
-        )
 
 
 def check_width(values: Any, actions: int, where: str) -> np.ndarray:
