@@ -65,7 +65,7 @@ def test_weights_of_another_shape_are_refused(call, tmp_path):
     network_of(inputs=7, actions=4, task="lunar-lander", discount=0.99).save(path)
     status, _, errors = call("reproduce", "lunar-lander", "--values", path)
     assert status == 2
-    assert "a network of 7 inputs and 4 actions; task lunar-lander needs 8 and 4" in errors
+    assert "a network of 7 inputs and 4 actions; task lunar-lander needs a network of 8" in errors
 
 
 def test_without_box2d_the_extra_to_install_is_named(tmp_path):

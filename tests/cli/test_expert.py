@@ -104,11 +104,14 @@ def test_an_expert_worse_than_random_is_warned_of(call):
         ((*POLE, "--opening", "-1"), "random_start = -1"),
         ((*POLE, "--check", "absent.npz"), "absent.npz: there is none"),
         ((*POLE, "--figures", "drawn"), "--figures drawn: they are of a check"),
-        (("Acrobot-v1", "--discount", "0.9", "--check", "pole.npz"), "of task CartPole-v1, 4"),
+        (
+            ("Acrobot-v1", "--discount", "0.9", "--check", "pole.npz"),
+            "4 inputs and 2 actions; task Acrobot",
+        ),
         (("cliff-walking", "--figures", "d", "--check", "pole.npz"), "a table needs none"),
-        (("cliff-walking", "--check", "pole.npz"), "pole.npz: a network"),
+        (("cliff-walking", "--check", "pole.npz"), "a network of 4 inputs"),
         (("cliff-walking", "--corrected", "mended.npz"), "the values of a table are exact"),
-        ((*POLE, "--check", "table.npz"), "table.npz: a table"),
+        ((*POLE, "--check", "table.npz"), "a table [48, 4]; task CartPole"),
         (("Pendulum-v1", "--discount", "0.9"), "numbered actions"),
     ],
 )

@@ -36,7 +36,7 @@ WRONG = {
     "expert cliff-walking --check folder": "error: values file folder: not a file of Q values",
     "expert cliff-walking --check empty": "error: values file empty: not a file of Q values (it is",
     "expert cliff-walking --check small.toml": "not a file of Q values (no archive of NumPy)",
-    "expert cliff-walking --check network.npz": "network.npz: a network; task cliff-walking needs",
+    "expert cliff-walking --check network.npz": "task cliff-walking needs a table",
     "expert cliff-walking --out folder": "error: --out folder: it is a folder; a file is needed",
     "expert cliff-walking --out empty/values.npz": "error: --out: empty is a file",
     "expert lunar-lander --corrected folder": "error: --corrected folder: it is a folder",

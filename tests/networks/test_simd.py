@@ -101,11 +101,11 @@ if platform.machine() == "x86_64":
     OTHERS.append("haswell")  # registers half as wide as those of later ones
 
 
-@pytest.mark.parametrize("processor", OTHERS)
-def test_learners_have_the_same_bits_on_other_processors(processor):
-    here, there = digests({}), digests({"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""})
+def test_learners_have_the_same_bits_on_other_processors():
+    here = digests({})
     assert len(set(here)) == len(NETWORKS)
-    assert there == here
+    for processor in OTHERS:
+        assert digests({"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}) == here, processor
 
 
 def digests(settings):

@@ -67,7 +67,9 @@ def in_a_random_world(assistant=MISLED, *, seen=None, **settings):
         crash=generator.random(shape) < 0.1,
         seen=seen,
     )
-    values = TabularValues(generator.normal(2, 1, (9, 3)), 0.7, task.name, "drawn at random")
+    told = 9 if seen is None else max(seen) + 1
+    table = generator.normal(2, 1, (9, 3))[:told]
+    values = TabularValues(table, 0.7, task.name, "drawn at random")
     learner = QLearner(
         discount=0.8,
         epsilon=Schedule(0.9, 0.1, 0.5),
