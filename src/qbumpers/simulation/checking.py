@@ -10,6 +10,7 @@ from qbumpers.errors import RequestError, checked, in_short
 from qbumpers.learners import Motor, learner_for_settings, learner_type
 from qbumpers.tasks import Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
+from qbumpers.values.events import EVENT_ROWS
 from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.others import further_values
 
@@ -30,7 +31,7 @@ def checked_values(
     """
     if not task.states:
         return _checked_network(task, assistant, values)
-    source: Any = solve(task) if values is None else values
+    source: Any = _solved(task, assistant) if values is None else values
     check_fit(source, use_at(task))
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
@@ -39,6 +40,11 @@ def checked_values(
     for state in np.flatnonzero(task.start):
         assistant.check_start(float(table[state].max()))
     return table, others, float(getattr(source, "discount", task.discount))
+
+
+def _solved(task: Task, assistant: Assistant) -> QValues:
+    """Q* of a task, with those of the further rows for its rule that can be solved."""
+    return solve(task, others=[name for name in assistant.values if name in EVENT_ROWS])
 
 
 def _table(task: Task, source: Any, name: str) -> np.ndarray:
