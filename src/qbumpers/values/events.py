@@ -7,6 +7,7 @@ import numpy as np
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks import TabularTask
+from qbumpers.values.tabular import DECIMALS, TabularValues
 
 _CLOSE = 1e-13
 
@@ -56,10 +57,24 @@ EVENT_ROWS: dict[str, Callable[[TabularTask], np.ndarray]] = {
 """What `solve` can give beside Q*, by the name that a rule asks for."""
 
 
+def event_values(task: TabularTask, name: str) -> TabularValues:
+    """One of the `EVENT_ROWS`, as values; they are not discounted.
+
+    Args:
+        task: which is solved.
+        name: of the row.
+
+    Raises:
+        RequestError: if the task announces no such events.
+    """
+    table = np.round(EVENT_ROWS[name](task), DECIMALS)
+    return TabularValues(table, 1.0, task.name, f"probability of {name} by value iteration")
+
+
 def _announced(task: TabularTask, event: str, flags: np.ndarray | None) -> np.ndarray:
     if flags is None:
         raise RequestError(
-            f"task {task.name} announces no {event}, so that its probability cannot be solved; "
+            f"task {task.name} announces no {event}, so that its probability cannot be solved: "
             f"give the task {event}="
         )
     return np.asarray(flags, np.bool_)

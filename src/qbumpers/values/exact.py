@@ -13,11 +13,8 @@ from qbumpers.errors import RequestError, unknown_name
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import check_task
-from qbumpers.values.events import EVENT_ROWS
-from qbumpers.values.tabular import TabularValues
-
-DECIMALS = 9
-"""Values are rounded so: actions that are equally good in truth must not differ by round-off."""
+from qbumpers.values.events import EVENT_ROWS, event_values
+from qbumpers.values.tabular import DECIMALS, TabularValues
 
 
 def solve(
@@ -69,13 +66,8 @@ def solve(
         task=task.name,
         method="exact dynamic programming",
         made_for=transitions_digest(tabular.dynamics()),
-        others={name: _event_row(tabular, name) for name in others},
+        others={name: event_values(tabular, name) for name in others},
     )
-
-
-def _event_row(task: TabularTask, name: str) -> TabularValues:
-    table = np.round(EVENT_ROWS[name](task), DECIMALS)
-    return TabularValues(table, 1.0, task.name, f"probability of {name} by value iteration")
 
 
 def backup(task: TabularTask, state_values: np.ndarray, discount: float) -> np.ndarray:
