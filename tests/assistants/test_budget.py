@@ -115,9 +115,7 @@ def test_falls_happen_once_the_budget_is_spent_which_the_bumpers_below_stop():
     assert bumpers(fall, NOISE) == Decision(1, 1.0)
 
 
-@pytest.mark.parametrize(
-    "limits", [{"in_all": 9}, {"share": 0.125}, {"per_episode": 1, "in_all": 9}]
-)
+@pytest.mark.parametrize("limits", [{"in_all": 9}, {"share": 0.125, "per_episode": 1}])
 def test_limits_do_the_same_in_every_host(limits):
     assistant = make_assistant("budget", of={"name": "correct"}, **limits)
     assert check_conformance(assistant, tasks=[slippery_corridor()])

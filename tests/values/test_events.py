@@ -1,5 +1,7 @@
 """Exact probabilities of crashes and success against plain loops, closed forms and Q* itself."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -93,6 +95,6 @@ def test_unknown_rows_are_named_with_the_nearest():
 def test_they_are_kept_with_the_values(tmp_path):
     values = solve(cliff_walking(), others=("safety",))
     values.save(tmp_path / "values.npz")
-    again = load_values(tmp_path / "values.npz")
+    again: Any = load_values(tmp_path / "values.npz")
     assert np.array_equal(again.others["safety"].table, values.others["safety"].table)
     assert again.digest() == values.digest() != solve(cliff_walking()).digest()
