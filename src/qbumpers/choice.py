@@ -46,6 +46,19 @@ def candidate_value(values: np.ndarray, second: bool) -> float:
 
 
 @compiled
+def only(values: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+    """The values [A] of the actions that are allowed, bool [A]; minus infinity elsewhere.
+
+    `best_value` and `pick` then choose among those actions.
+    """
+    found = np.full(len(values), -np.inf)
+    for action in range(len(values)):
+        if allowed[action]:
+            found[action] = values[action]
+    return found
+
+
+@compiled
 def pick(values: np.ndarray, target: float, tie: float) -> int:
     """One of the actions whose value is `target`, each with equal probability.
 

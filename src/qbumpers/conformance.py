@@ -22,6 +22,7 @@ from qbumpers.registration import as_numbers
 from qbumpers.session import Session, replay, rows_of
 from qbumpers.shared_control import RECORD, SharedControl
 from qbumpers.simulation import Condition, Setup, make_condition
+from qbumpers.simulation.condition import had_by
 from qbumpers.simulation.trials import engine_of
 from qbumpers.tasks import TabularTask, Task, cliff_walking
 from qbumpers.tasks.corridors import slippery_corridor, vector_corridor
@@ -262,11 +263,10 @@ def _learn_something(
 def small_tasks(assistant: Assistant, settings: Any = None) -> list[Task]:
     """Tasks of a few steps that an assistant and a learner can do."""
     observes = learner_for_settings(type(settings)).observes if settings is not None else None
-    tables_only = {"states", "dynamics"} & assistant.needs
     tasks: list[Task] = [slippery_corridor(), cliff_walking()] if observes != "vectors" else []
-    if observes != "states" and not tables_only and not assistant.needs - {"undo", "no_op"}:
+    if observes != "states":
         tasks.append(vector_corridor())
-    return tasks
+    return [task for task in tasks if all(had_by(task)[need] for need in assistant.needs)]
 
 
 def small_values(task: Task, assistant: Assistant) -> Any:

@@ -9,9 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers import RequestError, make_assistant, register_assistant
+from qbumpers.conformance import check_conformance, slippery_corridor
 from qbumpers.decisions import Decision, Noise
+from qbumpers.experiments.design import condition_id
 from qbumpers.simulation import make_condition, run
 from qbumpers.tasks import cliff_walking
+from tests.assistants.otherwise import bumpers
 from tests.assistants.own_rules import NoOptions, TakeBackOptions, guide, take_back
 from tests.assistants.situations import model_of, situation_of, step_of
 from tests.simulation.conditions import BUMPERS, on_the_cliff
@@ -53,6 +56,69 @@ def test_only_the_first_overrides_of_every_episode_happen(per_episode, episodes)
                 left -= 1
             else:
                 assert decision == Decision(0 if bad else 2, 0.0)
+
+
+@given(st.integers(0, 6), st.lists(st.booleans(), max_size=20))
+def test_a_budget_in_all_lasts_over_the_episodes(in_all, bads):
+    situations = [
+        (BAD if bad else GOOD)._replace(episode=step // 3, step=step % 3)
+        for step, bad in enumerate(bads)
+    ]
+    limited = make_assistant("budget", in_all=in_all, of="maximal")
+    found = [decision.probability == 1 for decision in decisions(limited, situations)]
+    before = np.cumsum([0, *bads])
+    assert found == [bad and before[step] < in_all for step, bad in enumerate(bads)]
+
+
+@given(st.sampled_from([0.0, 0.125, 0.25, 0.5, 0.75, 1.0]), st.lists(st.booleans(), max_size=40))
+def test_no_more_than_a_share_of_the_steps_so_far_is_overridden_and_no_less_if_possible(
+    share, bads
+):
+    limited = make_assistant("budget", share=share, of="maximal")
+    found, spent = decisions(limited, [BAD if bad else GOOD for bad in bads]), 0
+    for step, (bad, decision) in enumerate(zip(bads, found, strict=True), 1):
+        allowed = bad and spent + 1 <= share * step
+        assert decision.probability == float(allowed)
+        spent += allowed
+
+
+def test_of_several_limits_each_is_kept():
+    limited = make_assistant("budget", per_episode=2, in_all=5, share=0.5, of="maximal")
+    situations = [BAD._replace(episode=step // 6) for step in range(24)]
+    found = [int(decision.probability) for decision in decisions(limited, situations)]
+    assert found == [0, 1, 0, 1, 0, 0, *[1, 1, 0, 0, 0, 0], *[1, 0, 0, 0, 0, 0], *[0] * 6]
+
+
+@pytest.mark.parametrize(
+    ("limit", "value"), [("per_episode", -1), ("in_all", -1), ("share", 1.5), ("in_all", 2.5)]
+)
+def test_limits_have_bounds(limit, value):
+    with pytest.raises(RequestError, match=f"assistant budget: {limit} = {value}"):
+        make_assistant("budget", of="maximal", **{limit: value})
+
+
+def test_a_limit_that_is_left_out_leaves_no_trace_in_ids_and_streams():
+    # So it was before there were other limits than one per episode.
+    old = budget(2, INNER)
+    assert list(old.described()) == ["of", "per_episode"]
+    named = condition_id(old, [old, make_assistant("budget", of="maximal", in_all=3)])
+    assert named == 'budget/of={name="stochastic-q-bumpers",alpha=0.7,second=true},per_episode=2'
+    assert condition_id(make_assistant("budget", of="maximal", in_all=3), [old]) == (
+        'budget/of={name="maximal"},in_all=3'
+    )
+
+
+def test_falls_happen_once_the_budget_is_spent_which_the_bumpers_below_stop():
+    fall = situation_of([-13.0, 94.0], 0, start_value=87.0)
+    limited = make_assistant("budget", in_all=1, of={"name": "stochastic-q-bumpers", "alpha": 0.7})
+    assert decisions(limited, [fall] * 2) == [Decision(1, 1.0), Decision(0, 0.0)]
+    assert bumpers(fall, NOISE) == Decision(1, 1.0)
+
+
+@pytest.mark.parametrize("limits", [{"in_all": 9}, {"share": 0.125, "per_episode": 1}])
+def test_limits_do_the_same_in_every_host(limits):
+    assistant = make_assistant("budget", of={"name": "correct"}, **limits)
+    assert check_conformance(assistant, tasks=[slippery_corridor()])
 
 
 @pytest.mark.parametrize(("outer", "inner"), [(2, 3), (3, 2), (0, 5), (5, 0)])

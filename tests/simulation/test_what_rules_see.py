@@ -32,7 +32,7 @@ class Further:
 
     def __init__(self):
         self.discount = 1.0
-        self.others = {"comfort": COMFORT.__getitem__, "safety": STEERED.__getitem__}
+        self.others = {"comfort": COMFORT.__getitem__, "steadiness": STEERED.__getitem__}
 
     def __call__(self, state):
         return CLIFF(state)
@@ -46,7 +46,7 @@ def tell(situation, noise, options):
 
 
 def simulated():
-    register_assistant("tell", NoOptions, values=("safety", "comfort"))(tell)
+    register_assistant("tell", NoOptions, values=("steadiness", "comfort"))(tell)
     return on_the_cliff(("tell", {}), values=Further(), episodes=5)
 
 
@@ -77,7 +77,7 @@ def test_the_wrapper_tells_the_same():
 
 def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
     assistant = simulated().assistant
-    message = "assistant tell: it needs further values 'safety'; known: none"
+    message = "assistant tell: it needs further values 'steadiness'; known: none"
     with pytest.raises(RequestError, match=message):
         make_condition(cliff_walking(), assistant)
     with pytest.raises(RequestError, match=message):
@@ -88,7 +88,7 @@ def test_a_rule_whose_rows_are_missing_is_refused_everywhere():
 
 
 def test_values_and_further_rows_are_those_of_what_is_seen():
-    register_assistant("tell", NoOptions, values=("safety", "comfort"))(tell)
+    register_assistant("tell", NoOptions, values=("steadiness", "comfort"))(tell)
     seen = np.random.default_rng(4).integers(0, 48, 48)
     task = dataclasses.replace(cliff_walking(), seen=seen)
     condition = make_condition(task, make_assistant("tell"), values=Further())

@@ -91,8 +91,8 @@ class Assistant:
         return all(rule.compiled for rule in self.chain)
 
     def described(self) -> dict[str, Any]:
-        """The options by name, as JSON-like data; `of` as a table with a name."""
-        fields = self.options._asdict()
+        """The options by name, as JSON-like data; `of` as a table with a name, None left out."""
+        fields = {f: value for f, value in self.options._asdict().items() if value is not None}
         if self.of:
             fields["of"] = {"name": self.of.name, **self.of.described()}
         return fields

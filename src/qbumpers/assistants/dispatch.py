@@ -12,7 +12,7 @@ from numba import types
 from numba.extending import overload
 
 from qbumpers.assistants.registry import Rule, is_options, rule_for_options
-from qbumpers.compilation import INLINE, compiled_for_session, uncompiled
+from qbumpers.compilation import INLINE, compiled_for_session, inlined, uncompiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step, checked_decision
 
 
@@ -42,6 +42,23 @@ def undoes(decision: Decision) -> bool:
     return bool(decision.undo)
 
 
+def executing(decision: Decision, action: int, probability: float) -> Decision:
+    """Another action in place of a decision, for rules over rules.
+
+    Args:
+        decision: of the rule below; in compiled code the result has as many fields.
+        action: to execute instead; it is not undone.
+        probability: of an override, before the coin was tossed.
+    """
+    return Decision(action, probability)
+
+
+def with_probability(decision: Decision, probability: float) -> Decision:
+    """A decision with another probability of an override, for rules over rules."""
+    return decision._replace(probability=probability)
+
+
+@inlined
 def declined(decision: Decision, proposed: int) -> Decision:
     """The proposed action in place of a decision, for rules over rules.
 
@@ -49,7 +66,7 @@ def declined(decision: Decision, proposed: int) -> Decision:
         decision: of the rule below; in compiled code the result has as many fields.
         proposed: the action to execute instead.
     """
-    return Decision(proposed, 0.0)
+    return executing(decision, proposed, 0.0)
 
 
 @overload(decide, strict=False, jit_options=INLINE)
@@ -86,11 +103,18 @@ def _compiled_undoes(decision: Any) -> Any:
     return lambda decision: False
 
 
-@overload(declined, strict=False, jit_options=INLINE)
-def _compiled_declined(decision: Any, proposed: Any) -> Any:
+@overload(executing, strict=False, jit_options=INLINE)
+def _compiled_executing(decision: Any, action: Any, probability: Any) -> Any:
     if decision.count == 3:
-        return lambda decision, proposed: Decision(proposed, 0.0, False)
-    return lambda decision, proposed: Decision(proposed, 0.0)
+        return lambda decision, action, probability: Decision(action, probability, False)
+    return lambda decision, action, probability: Decision(action, probability)
+
+
+@overload(with_probability, strict=False, jit_options=INLINE)
+def _compiled_with_probability(decision: Any, probability: Any) -> Any:
+    if decision.count == 3:
+        return lambda decision, probability: Decision(decision.action, probability, decision.undo)
+    return lambda decision, probability: Decision(decision.action, probability)
 
 
 def _callable(rule: Rule, options: Any, function: Any) -> Any:

@@ -131,7 +131,7 @@ def register_assistant(
         built_in = is_of_package(function) and all(map(is_written_here, others))
         rule = Rule(
             name, function, options_type, start, observe, check_start, tuple(needs), tuple(values),
-            frozenset({"states", "vectors"} if is_compiled(function) else ()), built_in, revision,
+            frozenset(_kinds(needs) if is_compiled(function) else ()), built_in, revision,
         )  # fmt: skip
         if not built_in:
             rule = _of_user(rule)
@@ -173,7 +173,7 @@ def _of_user(rule: Rule) -> Rule:
         options_type=fresh_class(rule.options_type, rule.name, _remade),
         compiles_for=frozenset(),
     )
-    attempts = {kind: partial(_compile, rule, kind) for kind in _kinds(rule)}
+    attempts = {kind: partial(_compile, rule, kind) for kind in _kinds(rule.needs)}
     try:
         (decide, start, observe), compiles_for = compiled_or_plain(
             f"assistant {rule.name!r}", (rule.decide, rule.start, rule.observe), attempts
@@ -197,8 +197,8 @@ def compile_rule(rule: Rule, kind: Kind) -> None:
     _compile(rule, kind, rule.decide, rule.start, rule.observe)
 
 
-def _kinds(rule: Rule) -> tuple[Kind, ...]:
-    tables_only = {"states", "dynamics"} & set(rule.needs)
+def _kinds(needs: Sequence[str]) -> tuple[Kind, ...]:
+    tables_only = {"states", "dynamics"} & set(needs)
     return ("states",) if tables_only else ("states", "vectors")
 
 
@@ -213,8 +213,8 @@ def is_options(kind: Any) -> bool:
 
 
 def assistants() -> dict[str, Rule]:
-    """Every registered rule by name, in the order of registration."""
-    return dict(_rules)
+    """Every registered rule by name, in alphabetical order."""
+    return dict(sorted(_rules.items()))
 
 
 def registered(name: str) -> Rule:

@@ -228,7 +228,9 @@ def _learner_name(task: Any) -> str:
 
 
 def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
-    """A readable id: the name, with options that have no default or vary among its kind.
+    """A readable id: the name, with options that vary among its kind or have no default.
+
+    None counts as no default, and is not shown.
 
     Args:
         assistant: whose id is wanted.
@@ -243,6 +245,7 @@ def condition_id(assistant: Assistant, among: Sequence[Assistant]) -> str:
     shown = [
         f"{option}={written(value)}"
         for option, value in options.items()
-        if option not in defaults or any(other[option] != value for other in others)
+        if value is not None
+        and (defaults.get(option) is None or any(other[option] != value for other in others))
     ]
     return "/".join([assistant.name, ",".join(shown)]) if shown else assistant.name

@@ -115,10 +115,12 @@ def recorded(
 
 
 def _as_cells(assistant: Assistant) -> dict[str, Any]:
-    """Options as a table can hold them."""
+    """Options as a table can hold them; None is left out."""
     plain = (bool, int, float, str)
     fields = assistant.options._asdict()
-    return {f: v if isinstance(v, plain) else written(v) for f, v in fields.items()}
+    return {
+        f: v if isinstance(v, plain) else written(v) for f, v in fields.items() if v is not None
+    }
 
 
 def _alpha_of(assistant: Assistant | None) -> float | None:

@@ -1,15 +1,16 @@
 """What is wrong with the parts of a condition, found before any of it runs."""
 
 import json
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError, checked, in_short
 from qbumpers.learners import Motor, learner_for_settings, learner_type
-from qbumpers.tasks import Task
+from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
+from qbumpers.values.events import EVENT_ROWS, event_values
 from qbumpers.values.fitting import check_fit, use_at
 from qbumpers.values.others import further_values
 
@@ -22,7 +23,8 @@ def checked_values(
     Args:
         task: what is to be learned.
         assistant: whose values they are.
-        values: None for the exact solution of a task with a table.
+        values: None for the exact solution of a task with a table. Rows of `EVENT_ROWS` that values
+            of such a task lack are solved, too.
 
     Raises:
         RequestError: if they do not fit the task, or an episode could start in a state that does
@@ -35,10 +37,17 @@ def checked_values(
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
     for place, name in enumerate(assistant.values):
-        others[:, place] = _table(task, further_values(source, name, assistant.name), f" {name!r}")
+        others[:, place] = _table(task, _further(task, source, name, assistant), f" {name!r}")
     for state in np.flatnonzero(task.start):
         assistant.check_start(float(table[state].max()))
     return table, others, float(getattr(source, "discount", task.discount))
+
+
+def _further(task: Task, source: Any, name: str, assistant: Assistant) -> Any:
+    """Further values by name; those of events are solved if the given values hold none."""
+    if name in EVENT_ROWS and name not in getattr(source, "others", {}):
+        return event_values(cast(TabularTask, task), name)
+    return further_values(source, name, assistant.name)
 
 
 def _table(task: Task, source: Any, name: str) -> np.ndarray:

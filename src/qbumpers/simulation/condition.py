@@ -215,7 +215,7 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
             raise unknown_name("setting", name, Setup.__annotations__)
     check_task(task)
     helper = assistant_of(assistant, "assistant")
-    helper.check_task(task.name, _has(task))
+    helper.check_task(task.name, had_by(task))
     found = checked_values(task, helper, setup.get("values"))
     perception = setup.get("perception", "transition")
     if isinstance(perception, Perception):
@@ -257,8 +257,8 @@ def _check_numbers(condition: Condition) -> None:
         )
 
 
-def _has(task: Task) -> dict[str, bool]:
-    """What a task has of what a rule may need."""
+def had_by(task: Task) -> dict[str, bool]:
+    """Whether a task has it, for each of what a rule may need."""
     return {
         "states": task.states > 0,
         "dynamics": task.states > 0,

@@ -1,6 +1,7 @@
 """Corridors of a few steps, a tabular task and a vector task: for checks that take no time."""
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,16 @@ from qbumpers.tasks.dynamics import SUCCESS, TERMINATED
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.vector import VectorTask
 
+_APART = np.array([[0, 2, 1, 4], [2, 0, 1, 4], [1, 1, 0, 4], [4, 4, 4, 0]], float)
+
 
 @functools.cache
 def slippery_corridor() -> TabularTask:
     """Five cells and four actions: back, on (slips back 1 time in 4), stay, and back to the start.
 
     Every step costs 1; the last cell ends the episode with 10. As many actions as Cliff Walking
-    has, so that loops are compiled once for both.
+    has, so that loops are compiled once for both. Staying does nothing, and actions are as far
+    apart as they lead, in cells; back to the start is as far from all others as can be.
     """
     transition = np.zeros((5, 4, 5))
     for cell in range(5):
@@ -29,10 +33,11 @@ def slippery_corridor() -> TabularTask:
     reward = np.full((5, 4, 5), -1.0)
     reward[:, :, 4] = 10
     last = np.arange(5) == 4
-    return TabularTask.from_arrays(
+    task = TabularTask.from_arrays(
         transition, reward, last, start=0, discount=0.95, episode_limit=12, name="corridor",
         success=last,
     )  # fmt: skip
+    return replace(task, no_op=2, action_distance=_APART)
 
 
 class _Corridor:

@@ -3,22 +3,23 @@
 # SciPy has no types.
 # pyright: basic
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, unknown_name
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import check_task
-from qbumpers.values.tabular import TabularValues
-
-DECIMALS = 9
-"""Values are rounded so: actions that are equally good in truth must not differ by round-off."""
+from qbumpers.values.events import EVENT_ROWS, event_values
+from qbumpers.values.tabular import DECIMALS, TabularValues
 
 
-def solve(task: Task, discount: float | None = None) -> TabularValues:
+def solve(
+    task: Task, discount: float | None = None, *, others: Sequence[str] = ()
+) -> TabularValues:
     """Q* of a task, exact up to rounding to nine decimals.
 
     Policy iteration, each policy evaluated by a linear solve. Undiscounted, it starts from a
@@ -29,13 +30,17 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
     Args:
         task: what is to be solved.
         discount: of the values, in (0, 1]; the task's if None.
+        others: further rows that rules ask for, "safety" or "success", see
+            `qbumpers.values.events`; they are not discounted.
 
     Returns:
-        The values. Undiscounted, unreachable states without a proper policy have value 0.
+        The values, with the further ones in `others`. Undiscounted, unreachable states without a
+        proper policy have value 0.
 
     Raises:
         RequestError: if the task has no table of transitions, the discount is out of range, or
-            is 1 and a reachable state has no proper policy, or values grow without bound.
+            is 1 and a reachable state has no proper policy, values grow without bound, or there are
+            no such further rows or none of this task.
     """
     check_task(task)
     if "exact" not in task.value_sources:
@@ -43,6 +48,9 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
             f"task {task.name} has no table of transitions to be solved: its values are learned, "
             "see train_expert"
         )
+    for name in others:
+        if name not in EVENT_ROWS:
+            raise unknown_name("further values", name, EVENT_ROWS)
     tabular = cast(TabularTask, task)
     discount = task.discount if discount is None else discount
     if not 0 < discount <= 1:
@@ -58,6 +66,7 @@ def solve(task: Task, discount: float | None = None) -> TabularValues:
         task=task.name,
         method="exact dynamic programming",
         made_for=transitions_digest(tabular.dynamics()),
+        others={name: event_values(tabular, name) for name in others},
     )
 
 

@@ -27,6 +27,9 @@ from qbumpers.values.others import (
     separated,
 )
 
+DECIMALS = 9
+"""Exact values are rounded so: actions equally good in truth must not differ by round-off."""
+
 # What NumPy and the archive's reader raise at a file of another kind, or with a byte changed.
 _DAMAGE = (
     OSError, EOFError, KeyError, TypeError, ValueError, AttributeError, RuntimeError, BadZipFile,

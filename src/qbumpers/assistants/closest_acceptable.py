@@ -1,0 +1,65 @@
+"""The acceptable action nearest to the proposed one (Reddy, Dragan and Levine 2018).
+
+With Q'(s, a) = Q*(s, a) - min_b Q*(s, b), acceptable are
+
+    {a : Q'(s, a) >= (1 - alpha) max_b Q'(s, b)},
+
+and of these the one with the smallest distance d(a, a^h) is executed. `local-q-thresholding` has
+the same set, but replaces what is outside of it by the best action.
+"""
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from qbumpers.assistants.registry import register_assistant
+from qbumpers.choice import best_value, only, pick, worst_value
+from qbumpers.compilation import compiled
+from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+
+
+class ClosestAcceptableOptions(NamedTuple):
+    """Options of the closest acceptable action.
+
+    Attributes:
+        alpha: share of the range of values within which an action is acceptable; at 0 only best
+            ones are, at 1 all.
+    """
+
+    alpha: Annotated[float, Field(ge=0, le=1)]
+
+
+@compiled
+def distances(options: ClosestAcceptableOptions, model: Model) -> np.ndarray:
+    """The distance between actions, float64 [A, A]."""
+    return model.distance.copy()
+
+
+@compiled
+def unchanged(memory: np.ndarray, step: Step, options: ClosestAcceptableOptions) -> np.ndarray:
+    """The same distances: no step changes them."""
+    return memory
+
+
+@register_assistant(
+    "closest-acceptable", ClosestAcceptableOptions, start=distances, observe=unchanged,
+    needs=("distance",),
+)  # fmt: skip
+@compiled
+def closest_acceptable(
+    situation: Situation, noise: Noise, options: ClosestAcceptableOptions, memory: np.ndarray
+) -> Decision:
+    """Replace an unacceptable proposal by the nearest acceptable action, of equals the best.
+
+    If a neighbouring action will do, it is executed, although a better one is farther away;
+    an override of `stochastic-q-bumpers` executes the best one.
+    """
+    values, proposed = situation.values, situation.proposed
+    lowest = worst_value(values)
+    acceptable = values - lowest >= (1 - options.alpha) * (best_value(values) - lowest)
+    if acceptable[proposed]:
+        return Decision(proposed, 0.0)
+    nearness = only(-memory[proposed], acceptable)
+    nearest = only(values, nearness == best_value(nearness))
+    return Decision(pick(nearest, best_value(nearest), noise.tie), 1.0)
