@@ -9,6 +9,7 @@ import gymnasium
 from gymnasium import spaces
 
 from qbumpers.errors import RequestError, unknown_name
+from qbumpers.registration import is_written_here
 from qbumpers.tasks.cliff_walking import cliff_walking
 from qbumpers.tasks.stepping import make_environment
 from qbumpers.tasks.tabular import TabularTask
@@ -36,6 +37,11 @@ def register_task(name: str, make: Callable[..., Task]) -> None:
         make: makes the task; its parameters are the arguments that `make_task` takes for it.
     """
     _tasks[name] = make
+
+
+def own_tasks() -> dict[str, Callable[..., Task]]:
+    """What makes each task that was registered from outside this package, by name."""
+    return {name: make for name, make in _tasks.items() if not is_written_here(make)}
 
 
 def task_names() -> list[str]:
