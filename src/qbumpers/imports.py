@@ -26,7 +26,7 @@ def imported() -> list[str]:
     return list(_imported)
 
 
-def import_modules(names: Iterable[str], where: str, beside: Path | None = None) -> None:
+def import_modules(names: Iterable[str], where: str) -> None:
     """Import modules, so that what they register can be named.
 
     As with `python -m`, they may be in the current directory.
@@ -34,18 +34,19 @@ def import_modules(names: Iterable[str], where: str, beside: Path | None = None)
     Args:
         names: of modules, for instance "minigrid" or "my_tasks".
         where: for messages, for instance "imports".
-        beside: a folder in which they may be as well; it comes first.
 
     Raises:
         RequestError: naming the first that cannot be imported.
     """
     for name in names:
-        if not isinstance(name, str) or not all(part.isidentifier() for part in name.split(".")):
-            ending = "; leave .py out" if str(name).endswith(".py") else ""
+        parts = str(name).split(".")
+        if not all(part.isidentifier() for part in parts) or parts[-1] == "py":
+            ending = "; leave .py out" if parts[-1] == "py" else ""
             raise RequestError(
-                f"{where}: {name!r} is no name of a module, such as 'minigrid' or 'my_tasks'{ending}"
+                f"{where}: {name!r} is no name of a module, such as 'minigrid' or 'my_tasks'"
+                f"{ending}"
             )
-        with _found_in([*([beside] if beside else []), Path.cwd()]):
+        with found_in([Path.cwd()]):
             _import(name, where)
         _imported[name] = None
 
@@ -70,10 +71,14 @@ def _import(name: str, where: str) -> None:
 
 
 @contextlib.contextmanager
-def _found_in(folders: Iterable[Path]) -> Iterator[None]:
-    """Within the block, modules are looked for in these folders first; later, there at last."""
-    places = [str(folder.resolve()) for folder in folders]
-    before = list(sys.path)
+def found_in(folders: Iterable[Path]) -> Iterator[None]:
+    """Within the block, modules are looked for in these folders first; later, there at last.
+
+    Args:
+        folders: the first of them comes first.
+    """
+    resolved = dict.fromkeys(str(folder.resolve()) for folder in folders)
+    places = [place for place in resolved if place not in sys.path]
     sys.path[:0] = places
     importlib.invalidate_caches()
     try:
@@ -82,4 +87,4 @@ def _found_in(folders: Iterable[Path]) -> Iterator[None]:
         for place in places:
             sys.path.remove(place)
         # What a module imports when it is first needed may be beside it.
-        sys.path += [place for place in dict.fromkeys(places) if place not in before]
+        sys.path += places

@@ -17,7 +17,8 @@ from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.identity import task_inside
 from qbumpers.tasks.undoing import reached_limit, undo_of
 from qbumpers.values import QValues, TabularValues, load_values
-from qbumpers.values.fitting import check_fit, use_in
+from qbumpers.values.fitting import use_in
+from qbumpers.values.tabular import as_values
 
 RECORD, SUMMARY = "assistance", "assisted_episode"
 """Keys of `info`: the record of every step, and the summary at the end of an episode."""
@@ -44,8 +45,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     Args:
         env: an environment with a Discrete action space.
         assistant: an assistant, or the name of one, its options then being given by `options`.
-        values: Q* of the assistant, any callable from an observation to one value per action; or
-            the path of a file written by `TabularValues.save`.
+        values: Q* of the assistant: an array [S, A], any callable from an observation to one value
+            per action, or the path of a file written by `TabularValues.save`.
         discount: of the values, in (0, 1]; needed if the values do not state their own.
         perception: learner model for the record's `credited` action, a `Perception` or its name.
         **options: of the assistant, for instance `alpha=0.7`.
@@ -61,7 +62,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self,
         env: gymnasium.Env[Any, Any],
         assistant: Assistant | str,
-        values: QValues | str | Path,
+        values: QValues | np.ndarray | str | Path,
         *,
         discount: float | None = None,
         perception: Perception | str = "transition",
@@ -84,8 +85,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self.assistant = (
             assistant if isinstance(assistant, Assistant) else make_assistant(assistant, **options)
         )
-        self.values: QValues = load_values(values) if isinstance(values, str | Path) else values
-        self.discount = _discount_of(self.values, discount)
+        given: Any = load_values(values) if isinstance(values, str | Path) else values
+        self.discount = _discount_of(given, discount)
         self.perception = perception
         self._actions = int(env.action_space.n)
         self._first_action = int(env.action_space.start)
@@ -98,10 +99,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._undo = undo_of(env) if "undo" in self.assistant.needs else None
         model = self._model()
         name = str(env.spec.id if env.spec else env)
-        check_fit(
-            self.values,
-            use_in(env, name, model.states, model.observation_size, self.values),
-        )
+        use = use_in(env, name, model.states, model.observation_size, given)
+        self.values: QValues = as_values(given, use._replace(discount=self.discount))
         values = _from_zero(self.values, self._first_state)
         self._session = Session(self.assistant, values, model, perception)
 

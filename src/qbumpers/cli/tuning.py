@@ -10,7 +10,7 @@ from rich.table import Table
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import On, Out, Workers, backend_for
+from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
 
 if TYPE_CHECKING:
     from qbumpers.tuning import Contender, Tuning
@@ -28,6 +28,7 @@ def tune(
     confidence: Annotated[
         float, typer.Option(help="That the choice is above the floor.", metavar="SHARE")
     ] = 0.95,
+    imports: Imports = None,
     workers: Workers = None,
     on: On = None,
     out: Out = None,
@@ -46,7 +47,7 @@ def tune(
 
     with stoppable():
         with expert_warnings_printed():
-            plan = make_plan(load_experiment(experiment))
+            plan = make_plan(load_experiment(experiment, imports=imports or ()))
         folder = out or f"results/{plan.experiment.name}"
         OUTPUT.print(
             f"[bold]{plan.experiment.name}[/bold]: {len(plan.named)} conditions race, up to "

@@ -14,6 +14,7 @@ from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import kept_files, load
+from qbumpers.imports import import_modules
 from qbumpers.registration import files_from
 from qbumpers.simulation import record
 from qbumpers.tasks import Task
@@ -61,6 +62,9 @@ def export_recording(
             f"dataset = {dataset!r}; a name with a version, such as 'cliff/bumpers-v0', is needed"
         )
     results = load(folder)
+    if results.experiment.imports:  # so that what they register is known when it is read
+        import_modules(results.experiment.imports, f"imports of {folder}")
+        results = load(folder)
     noted = {each.condition: each for each in results.conditions}
     if condition not in noted:
         raise unknown_name("condition", condition, noted)

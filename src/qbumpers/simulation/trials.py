@@ -15,10 +15,11 @@ from qbumpers.simulation.condition import Condition, Setup, make_condition
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
 from qbumpers.simulation.workers import make_pool, some_finished
 from qbumpers.tasks import Task
+from qbumpers.tasks.registry import Named
 
 
 def simulate(
-    task: Task,
+    task: Task | Named,
     assistant: Assistant | str,
     *,
     trials: int | range = 100,
@@ -33,7 +34,8 @@ def simulate(
     of workers and whichever trials are run together.
 
     Args:
-        task: what is to be learned.
+        task: what is to be learned: a task, or what `make_task` makes one of, for instance
+            "cliff-walking"; of a Gymnasium environment, give its `discount` too.
         assistant: an assistant, or the name of one that needs no options.
         trials: how many, at least 1; or which.
         seed: decides, with the condition and the number of a trial, all chance; not negative.

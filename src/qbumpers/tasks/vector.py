@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.wrappers import TimeLimit
 
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
@@ -20,7 +21,10 @@ from qbumpers.tasks.stepping import (
     REVISION,
     GymnasiumStepper,
     Stepper,
+    environment_name,
     make_environment,
+    maker_name,
+    maker_of,
     stepped_by_of,
 )
 from qbumpers.tasks.task import distance_between
@@ -185,7 +189,12 @@ class VectorTask:
 
     @classmethod
     def from_gymnasium(
-        cls, name: str, *, discount: float, episode_limit: int | None = None, **arguments: Any
+        cls,
+        environment: Any,
+        *,
+        discount: float,
+        episode_limit: int | None = None,
+        **arguments: Any,
     ) -> "VectorTask":
         """A task from a Gymnasium environment with numbered actions and a vector observation.
 
@@ -195,7 +204,8 @@ class VectorTask:
         undone if `undo_of` says so of the environment.
 
         Args:
-            name: id of the environment, for example "CartPole-v1".
+            environment: its id, for example "CartPole-v1"; a function or class that makes
+                it; or an environment of `gymnasium.make`, which is made again with its wrappers.
             discount: in (0, 1]; Gymnasium's environments state none.
             episode_limit: steps; the environment's own limit if None.
             **arguments: of the environment, JSON-like.
@@ -208,7 +218,12 @@ class VectorTask:
                 not Discrete or its observations not a vector, no limit is known, or an episode
                 depends on those before it.
         """
-        with closing(make_environment(name, **arguments)) as environment:
+        maker: Any = environment
+        if isinstance(environment, gymnasium.Env):
+            episode_limit = step_limit(environment) if episode_limit is None else episode_limit
+            maker, arguments = maker_of(environment)
+        with closing(make_environment(maker, **arguments)) as environment:
+            name = maker if isinstance(maker, str) else environment_name(environment)
             _check_spaces(name, environment)
             _check_repeatable(name, environment)
             announced, undoable = _announced(environment), can_undo(environment)
@@ -218,15 +233,13 @@ class VectorTask:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         return cls(
             name=name,
-            make_stepper=functools.partial(GymnasiumStepper, name, arguments),
-            make_environment=functools.partial(
-                gymnasium.make, name, max_episode_steps=limit, **arguments
-            ),
+            make_stepper=functools.partial(GymnasiumStepper, maker, arguments),
+            make_environment=_maker_for_participants(maker, limit, arguments),
             observation_size=environment.observation_space.shape[0],
             actions=int(environment.action_space.n),
             discount=discount,
             episode_limit=limit,
-            settings={"environment": name, "arguments": arguments},
+            settings={"environment": name, "arguments": arguments, **_made_by(maker, environment)},
             has_success="success" in announced,
             has_crash="crash" in announced,
             undoable=undoable,
@@ -236,6 +249,31 @@ class VectorTask:
             stepped_by=stepped_by,
             revision=REVISION,
         )
+
+
+def _maker_for_participants(
+    maker: Any, limit: int, arguments: Mapping[str, Any]
+) -> Callable[..., gymnasium.Env[Any, Any]]:
+    if isinstance(maker, str):
+        return functools.partial(gymnasium.make, maker, max_episode_steps=limit, **arguments)
+    return functools.partial(_limited, maker, limit, arguments)
+
+
+def _limited(
+    maker: Any, limit: int, arguments: Mapping[str, Any], *, render_mode: str | None = None
+) -> gymnasium.Env[Any, Any]:
+    """What a function makes, with a step limit if it has another or none."""
+    drawn = {} if render_mode is None else {"render_mode": render_mode}
+    environment = make_environment(maker, **arguments, **drawn)
+    return environment if step_limit(environment) == limit else TimeLimit(environment, limit)
+
+
+def _made_by(maker: Any, environment: Any) -> dict[str, Any]:
+    """What tells an environment that a function makes from the one of its id."""
+    if isinstance(maker, str):
+        return {}
+    around = [type(layer).__name__ for layer in altering_wrappers(environment)]
+    return {"made by": maker_name(maker), "wrappers": around}
 
 
 def _plain_facts(no_op: int, distance: np.ndarray | None) -> list[Any]:

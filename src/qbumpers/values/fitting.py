@@ -27,6 +27,7 @@ class Use(NamedTuple):
         inputs: numbers of an observation that is a vector; 0 if it is none.
         actions: A.
         identity: as tasks have it; empty if it is not known.
+        discount: of values that state none, in (0, 1]; None if it is not known.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Use(NamedTuple):
     inputs: int
     actions: int
     identity: str = ""
+    discount: float | None = None
 
     def needs(self) -> str:
         """What kind of values, in words."""
@@ -48,7 +50,9 @@ def use_at(task: Task) -> Use:
     """What values of a task are put to."""
     rows = task.states if task.seen is None else int(max(task.seen)) + 1
     name = f"task {task.name}"
-    return Use(name, rows, task.observation_size, task.actions, task.identity())
+    return Use(
+        name, rows, task.observation_size, task.actions, task.identity(), float(task.discount)
+    )
 
 
 def use_in(environment: Any, name: str, states: int, inputs: int, stated: Any) -> Use:
