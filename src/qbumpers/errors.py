@@ -14,8 +14,9 @@ _LONGEST_SHOWN = 80
 _SYNONYMS = {
     "gamma": ("discount",),
     "discount_factor": ("discount",),
-    "lr": ("learning_rate", "step_size"),
-    "learning_rate": ("step_size",),
+    "lr": ("learning_rate",),
+    "step_size": ("learning_rate",),
+    "alpha": ("learning_rate",),
     "eps": ("epsilon",),
     "exploration": ("epsilon",),
     "max_episode_steps": ("episode_limit",),
@@ -31,7 +32,7 @@ _SYNONYMS = {
     "agents": ("learners",),
     "policy": ("assistant", "assistants"),
 }
-"""What others call it, and what it may be here."""
+"""What is known elsewhere by another word, and the words for it here."""
 
 
 class RequestError(ValueError):
@@ -79,6 +80,11 @@ def in_short(value: Any) -> str:
     """A value as messages show it: in one line that is not long."""
     shown = " ".join(repr(value).split())
     return shown if len(shown) <= 80 else f"{shown[:77]}..."
+
+
+def counted(number: int, noun: str) -> str:
+    """How many of something, for instance "1 trial" or "2,000 trials"."""
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
 
 
 def check_number(value: Any, where: str, allowed: str) -> None:

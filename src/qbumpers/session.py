@@ -28,7 +28,7 @@ from qbumpers.decisions import (
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError, action_number
+from qbumpers.errors import RequestError, action_number, counted
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
@@ -260,7 +260,8 @@ def replay(session: Session, stepper: Any, log: Step | Iterable[Step]) -> int:
     steps = list(rows_of(log) if isinstance(log, Step) else log)
     if steps and not int(steps[-1].events) & _ENDS:
         raise ReplayError(
-            f"replay: the log ends after {len(steps)} steps, before its last episode does"
+            f"replay: the log ends after {counted(len(steps), 'step')}, before its last episode "
+            "does"
         )
     over = True
     for number, recorded in enumerate(steps):

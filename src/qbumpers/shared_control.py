@@ -1,5 +1,6 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,10 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.assistants.registry import registered
 from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model, Noise, Step
-from qbumpers.errors import RequestError, action_number, check_number
+from qbumpers.errors import RequestError, action_number, check_number, suggestion, unknown_name
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
@@ -23,6 +25,7 @@ from qbumpers.values.tabular import as_values
 RECORD, SUMMARY = "assistance", "assisted_episode"
 """Keys of `info`: the record of every step, and the summary at the end of an episode."""
 
+_OWN = ("discount", "perception")  # arguments beside those of the assistant
 _NOISE_DRAWN = 256  # decisions for which noise is drawn at a time
 
 
@@ -82,6 +85,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             raise RequestError(
                 f"options {sorted(options)} go with an assistant's name, not with an Assistant"
             )
+        _check_names(assistant, options)
         self.assistant = (
             assistant if isinstance(assistant, Assistant) else make_assistant(assistant, **options)
         )
@@ -263,6 +267,16 @@ class _FromZero:
 def _from_zero(values: QValues, first: int) -> QValues:
     """Values of states that count from 0; a table's do already."""
     return values if not first or isinstance(values, TabularValues) else _FromZero(values, first)
+
+
+def _check_names(assistant: Assistant | str, options: Mapping[str, Any]) -> None:
+    """RequestError for an option that means an argument of the wrapper itself."""
+    if options and not isinstance(assistant, Assistant):
+        kind: Any = registered(assistant).options_type
+        fields: tuple[str, ...] = kind._fields
+        for option in options:
+            if option not in fields and suggestion(option, _OWN):
+                raise unknown_name("argument", option, [*_OWN, *fields])
 
 
 def _checked_noise(noise: Any) -> list[list[float]]:

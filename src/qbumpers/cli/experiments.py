@@ -18,7 +18,7 @@ from qbumpers.cli.console import (
 )
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -202,8 +202,9 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
     folder = out or f"results/{experiment.name}"
     more = f" and {experiment.retention} without the assistant" if experiment.retention else ""
     OUTPUT.print(
-        f"[bold]{experiment.name}[/bold]: {len(plan.named)} conditions, {experiment.trials} "
-        f"trials of {experiment.episodes} episodes{more}, into {escape(folder)}",
+        f"[bold]{experiment.name}[/bold]: {counted(len(plan.named), 'condition')}, "
+        f"{counted(experiment.trials, 'trial')} of {counted(experiment.episodes, 'episode')}"
+        f"{more}, into {escape(folder)}",
         soft_wrap=True,
     )
     with backend_for(workers, on) as backend, TrialProgress("simulating", _announce) as progress:
@@ -213,12 +214,15 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
 
 def _announce(done: "RunProgress") -> None:
     if done.trials == done.of:
-        OUTPUT.print("All trials are there already.")
+        OUTPUT.print(
+            "All trials are there already." if done.of > 1 else "The trial is there already."
+        )
         return
-    there = f"{done.trials:,} are there already, " if done.trials else ""
+    verb = "is" if done.trials == 1 else "are"
+    there = f"{done.trials:,} {verb} there already, " if done.trials else ""
     missing = f"{done.of - done.trials:,} to run"
     expected = f"{duration(done.expected)} by a short calibration"
-    OUTPUT.print(f"{done.of:,} trials: {there}{missing}, {expected}")
+    OUTPUT.print(f"{counted(done.of, 'trial')}: {there}{missing}, {expected}")
 
 
 def _analyse(folder: str) -> None:

@@ -204,6 +204,7 @@ def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None
             bar.update(shown, completed=done, description=f"steps, seed {seed}")
 
         found = train_best(task, recipe, seeds, path, report)
+        bar.update(shown, completed=recipe.steps * len(seeds))
     OUTPUT.print(_judgements(task, seeds, found.judgements))
     with expert_warnings_printed():
         check_expert(task, found.values)
@@ -292,6 +293,7 @@ def _correct(task: "Task", path: Path, out: Path) -> None:
             branches=correcting.BRANCHES,
             report=lambda done: bar.update(shown, completed=done),
         )
+        bar.update(shown, completed=correcting.BRANCHES)
     found.values.save(out)
     OUTPUT.print(
         f"- In states held out the error was {_with_error(found.before.absolute)} in size, now "

@@ -11,6 +11,7 @@ from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
 from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
+from qbumpers.errors import counted
 
 if TYPE_CHECKING:
     from qbumpers.tuning import Contender, Tuning
@@ -49,10 +50,11 @@ def tune(
         with expert_warnings_printed():
             plan = make_plan(load_experiment(experiment, imports=imports or ()))
         folder = out or f"results/{plan.experiment.name}"
+        verb = "races" if len(plan.named) == 1 else "race"
         OUTPUT.print(
-            f"[bold]{plan.experiment.name}[/bold]: {len(plan.named)} conditions race, up to "
-            f"{plan.experiment.trials} trials of {plan.experiment.episodes} episodes each, into "
-            f"{escape(folder)}",
+            f"[bold]{plan.experiment.name}[/bold]: {counted(len(plan.named), 'condition')} {verb}, "
+            f"up to {counted(plan.experiment.trials, 'trial')} of "
+            f"{counted(plan.experiment.episodes, 'episode')} each, into {escape(folder)}",
             soft_wrap=True,
         )
         with (
@@ -86,7 +88,9 @@ def _contenders(found: "Tuning") -> Table:
 
 def _cost(found: "Tuning") -> str:
     share = found.trials / found.grid_trials
-    return f"{found.trials:,} trials, {share:.0%} of the full grid's {found.grid_trials:,}."
+    return (
+        f"{counted(found.trials, 'trial')}, {share:.0%} of the full grid's {found.grid_trials:,}."
+    )
 
 
 def _no_choice(found: "Tuning") -> str:

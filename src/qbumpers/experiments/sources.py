@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from qbumpers.errors import RequestError, from_validation
+from qbumpers.errors import RequestError, counted, from_validation
 from qbumpers.experiments.cells import MANY_CELLS, MOST_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign
 from qbumpers.experiments.learner_designs import RECORDED, field_names
@@ -66,8 +66,9 @@ def make_experiment(
     if cells > (MOST_CELLS if large else MANY_CELLS):
         refused = "is too many" if large else "must be asked for with --yes"
         raise RequestError(
-            f"{where}: {experiment.condition_count():,} conditions, together {cells:,} cells of "
-            f"work; more than {MOST_CELLS if large else MANY_CELLS:,} {refused}"
+            f"{where}: {counted(experiment.condition_count(), 'condition')}, together "
+            f"{counted(cells, 'cell')} of work; more than "
+            f"{MOST_CELLS if large else MANY_CELLS:,} {refused}"
         )
     try:
         experiment.conditions()

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 
 from qbumpers.errors import RequestError, in_short
 from qbumpers.source import version_of
@@ -169,6 +170,36 @@ def environment_name(environment: Any) -> str:
     """The id of a Gymnasium environment, or the name of its class."""
     spec = environment.spec
     return str(spec.id) if spec else type(environment.unwrapped).__name__
+
+
+def remade_by(environment: Any, limit: int | None) -> EnvSpec | None:
+    """How Gymnasium can make an environment again in any process, written as text.
+
+    Args:
+        environment: with its wrappers.
+        limit: its steps.
+
+    Returns:
+        The specification; None if it names what cannot be written, or comes from no module.
+    """
+    if environment.spec is None:
+        return None
+    kwargs = {k: v for k, v in environment.spec.kwargs.items() if k != "render_mode"}
+    made = environment.spec.entry_point
+    named = made if isinstance(made, str) else f"{made.__module__}:{maker_name(made)}"
+    spec = dataclasses.replace(
+        environment.spec, kwargs=kwargs, max_episode_steps=limit, entry_point=named
+    )
+    wrappers = spec.additional_wrappers
+    try:
+        load_env_creator(named)
+        spec.to_json()
+    except (ImportError, AttributeError, TypeError, ValueError):
+        return None
+    from_modules = (named, *(wrapper.entry_point for wrapper in wrappers))
+    if any(name.startswith("__main__:") for name in from_modules):
+        return None
+    return None if any(wrapper.kwargs is None for wrapper in wrappers) else spec
 
 
 def maker_of(environment: Any) -> tuple[str | Callable[..., Any], dict[str, Any]]:

@@ -4,6 +4,7 @@ from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
 from qbumpers.errors import RequestError, in_short
 from qbumpers.tasks.dynamics import Dynamics
@@ -126,6 +127,11 @@ class Task(Protocol):
     @property
     def releases_gil(self) -> bool:
         """Whether simulations of it run in threads at once: none of it is Python."""
+        ...
+
+    @property
+    def environment_spec(self) -> EnvSpec | None:
+        """How Gymnasium makes the environment that it is; None if Gymnasium does not know it."""
         ...
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeLimit
 
 from qbumpers.errors import RequestError
@@ -25,6 +26,7 @@ from qbumpers.tasks.stepping import (
     make_environment,
     maker_name,
     maker_of,
+    remade_by,
     stepped_by_of,
 )
 from qbumpers.tasks.task import distance_between
@@ -61,6 +63,8 @@ class VectorTask:
         first_action: number that the environment gives to action 0.
         origin: digest of the Gymnasium environment that it was made from; empty if there is none.
         make_display: makes `display` of the task; no part of its digest.
+        environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
+            digest.
         stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
             classes and functions; and modules, for the versions of their libraries.
         revision: raised when it gives other numbers for a reason that its code does not show.
@@ -87,6 +91,7 @@ class VectorTask:
     first_action: int = 0
     origin: str = ""
     make_display: Callable[["VectorTask"], Any] | None = None
+    environment_spec: EnvSpec | None = None
     stepped_by: tuple[Any, ...] = ()
     revision: int = 1
 
@@ -114,8 +119,8 @@ class VectorTask:
             ) from error
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without `stepped_by`, which workers need not have: modules cannot be pickled."""
-        return {**self.__dict__, "stepped_by": ()}
+        """Without what workers need not have: modules cannot be pickled."""
+        return {**self.__dict__, "stepped_by": (), "environment_spec": None}
 
     @property
     def start(self) -> np.ndarray:
@@ -229,6 +234,7 @@ class VectorTask:
             announced, undoable = _announced(environment), can_undo(environment)
             stepped_by = stepped_by_of(environment)
             limit = step_limit(environment) if episode_limit is None else episode_limit
+            spec = remade_by(environment, limit)
         if limit is None:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         return cls(
@@ -246,6 +252,7 @@ class VectorTask:
             first_action=int(environment.action_space.start),
             origin=environment_digest(environment),
             make_display=display_maker(environment),
+            environment_spec=spec,
             stepped_by=stepped_by,
             revision=REVISION,
         )

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 
-from qbumpers.errors import RequestError, in_short
+from qbumpers.errors import RequestError, counted, in_short
 from qbumpers.tasks.construction import description_of
 from qbumpers.tasks.identity import (
     environment_digest,
@@ -42,7 +42,8 @@ class Use(NamedTuple):
         if self.rows:
             return f"a table [{self.rows}, {self.actions}]"
         if self.inputs:
-            return f"a network of {self.inputs} inputs and {self.actions} actions"
+            inputs, actions = counted(self.inputs, "input"), counted(self.actions, "action")
+            return f"a network of {inputs} and {actions}"
         return "a function of observations that are neither numbers of states nor vectors"
 
 

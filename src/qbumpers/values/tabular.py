@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 import qbumpers
-from qbumpers.errors import RequestError, in_short
+from qbumpers.errors import RequestError, counted, in_short
 from qbumpers.files import write_atomically
 from qbumpers.values.fitting import Use, check_fit, check_made_for
 from qbumpers.values.network import NetworkValues, network_values
@@ -117,7 +117,7 @@ class TabularValues:
         if not 0 <= state < len(self.table):  # -1 would be taken for the last state
             raise RequestError(
                 f"values of {self.task}: {in_short(observation)} is not the number of a state; "
-                f"their table has {len(self.table)} states, from 0 on"
+                f"their table has {counted(len(self.table), 'state')}, from 0 on"
             )
         return self.table[state]
 
