@@ -9,7 +9,6 @@ import dataclasses
 import importlib.util
 import statistics
 import time
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +19,7 @@ from qbumpers.assistants import make_assistant
 from qbumpers.learners import DoubleDQN, Schedule
 from qbumpers.networks import Network
 from qbumpers.simulation import Condition, make_condition, run
-from qbumpers.simulation.workers import make_pool
+from qbumpers.simulation.workers import Pool, make_pool
 from qbumpers.tasks import VectorTask, make_task
 from qbumpers.tasks.lunar_lander.stepper import Lander
 from qbumpers.values import NetworkValues
@@ -180,16 +179,17 @@ def processes(rounds: int) -> list[Row]:
     condition = condition_of(lunar_lander())
     peaks: list[float] = []
 
-    def rate(pool: Executor, number: int) -> Timed:
+    def rate(pool: Pool, number: int) -> Timed:
         def timed(first: int) -> float:
             trials = range(first, first + number)
-            found = list(pool.map(block, [condition] * number, trials))
+            blocks = [pool.submit(block, "", each) for each in trials]
+            found = [each.result() for each in blocks]
             peaks.extend(peak for _, peak in found)
             return sum(each for each, _ in found) / 1e3
 
         return timed
 
-    with make_pool(condition.task, 2) as pool:
+    with make_pool({"": condition}, 2) as pool:
         timed = {"two": rate(pool, 2), "one": rate(pool, 1)}
         alternate(timed, 2)  # starts both processes, and loads compiled code
         rates = alternate(timed, rounds)

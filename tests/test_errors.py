@@ -5,7 +5,7 @@ from typing import Annotated
 import pytest
 from pydantic import BaseModel, Field, ValidationError, field_validator
 
-from qbumpers.errors import RequestError, from_validation, unknown_name
+from qbumpers.errors import RequestError, counted, from_validation, suggestion, unknown_name
 
 
 class Trial(BaseModel):
@@ -109,3 +109,25 @@ def test_a_check_that_does_not_is_told_with_its_field_and_value():
     assert "unknown task 'clif'" in message
     assert "; steps = 4: " in message
     assert message.endswith("an odd number is needed")
+
+
+@pytest.mark.parametrize(
+    ("given", "known", "meant"),
+    [
+        ("gamma", ["alpha", "discount"], " (did you mean 'discount'?)"),
+        ("lr", ["epsilon", "learning_rate"], " (did you mean 'learning_rate'?)"),
+        ("alpha", ["epsilon", "learning_rate"], " (did you mean 'learning_rate'?)"),
+        ("max_episode_steps", ["discount", "episode_limit"], " (did you mean 'episode_limit'?)"),
+        ("gama", ["gamma", "discount"], " (did you mean 'gamma'?)"),
+        ("gamma", ["alpha", "epsilon"], ""),
+        ("MiniGrid-Empty-5x5-v0", ["MountainCar-v0"], ""),
+    ],
+)
+def test_another_word_for_a_name_is_known(given, known, meant):
+    assert suggestion(given, known) == meant
+
+
+def test_what_is_counted_is_in_the_singular_if_there_is_one():
+    assert [counted(n, "trial") for n in (0, 1, 2, 2000)] == [
+        "0 trials", "1 trial", "2 trials", "2,000 trials",
+    ]  # fmt: skip

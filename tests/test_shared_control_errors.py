@@ -21,7 +21,7 @@ def test_an_action_space_without_numbered_actions_is_refused():
         SharedControl(pendulum, "none", CLIFF)
 
 
-@pytest.mark.parametrize("values", [np.zeros((48, 4)), {36: [0.0] * 4}, None, 3])
+@pytest.mark.parametrize("values", [np.zeros((48, 4)).tolist(), {36: [0.0] * 4}, None, 3])
 def test_values_that_cannot_be_called_are_refused(values):
     with pytest.raises(RequestError, match=r"values = .*; a table \[48, 4\] is needed for env"):
         SharedControl(gymnasium.make("qbumpers/CliffWalking-v0"), "none", values, discount=0.9)
@@ -46,6 +46,12 @@ def test_an_unknown_assistant_names_the_nearest():
 def test_an_unknown_option_names_the_nearest():
     with pytest.raises(RequestError, match=r"'alhpa'.*did you mean 'alpha'"):
         walking("stochastic-q-bumpers", alhpa=0.7)
+
+
+@pytest.mark.parametrize("option", ["gamma", "discuont"])
+def test_another_word_for_an_argument_of_the_wrapper_is_named(option):
+    with pytest.raises(RequestError, match=rf"'{option}' \(did you mean 'discount'\?\)"):
+        walking("stochastic-q-bumpers", **{option: 0.9})
 
 
 def test_a_missing_option_is_named():

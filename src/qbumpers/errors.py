@@ -11,6 +11,28 @@ if TYPE_CHECKING:
 
 
 _LONGEST_SHOWN = 80
+_SYNONYMS = {
+    "gamma": ("discount",),
+    "discount_factor": ("discount",),
+    "lr": ("learning_rate",),
+    "step_size": ("learning_rate",),
+    "alpha": ("learning_rate",),
+    "eps": ("epsilon",),
+    "exploration": ("epsilon",),
+    "max_episode_steps": ("episode_limit",),
+    "n_episodes": ("episodes",),
+    "n_trials": ("trials",),
+    "runs": ("trials",),
+    "env": ("task",),
+    "environment": ("task",),
+    "env_kwargs": ("arguments",),
+    "kwargs": ("arguments",),
+    "q_values": ("values",),
+    "agent": ("learner", "learners"),
+    "agents": ("learners",),
+    "policy": ("assistant", "assistants"),
+}
+"""What is known elsewhere by another word, and the words for it here."""
 
 
 class RequestError(ValueError):
@@ -60,6 +82,11 @@ def in_short(value: Any) -> str:
     return shown if len(shown) <= 80 else f"{shown[:77]}..."
 
 
+def counted(number: int, noun: str) -> str:
+    """How many of something, for instance "1 trial" or "2,000 trials"."""
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
 def check_number(value: Any, where: str, allowed: str) -> None:
     """Check that something is a number at all, before it is compared.
 
@@ -75,24 +102,34 @@ def check_number(value: Any, where: str, allowed: str) -> None:
         raise RequestError(f"{where} = {value!r}; a number {allowed} is needed")
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str]) -> RequestError:
+def unknown_name(kind: str, name: str, known: Iterable[str], otherwise: str = "") -> RequestError:
     """An error for an unknown name, with the nearest known one.
 
     Args:
         kind: what was named, for instance "assistant".
         name: what the user wrote.
         known: names that would have been right, which the message lists.
+        otherwise: what may help if no known one is near.
 
     Returns:
         The error, to be raised by the caller.
     """
     names = list(known)
     allowed = ", ".join(names) if names else "there are none"
-    return RequestError(f"unknown {kind} {name!r}{_nearest(name, names)}. Known: {allowed}")
+    near = suggestion(name, names) or otherwise
+    return RequestError(f"unknown {kind} {name!r}{near}. Known: {allowed}")
 
 
-def _nearest(name: str, known: Iterable[str]) -> str:
-    nearest = difflib.get_close_matches(str(name), list(known), n=1, cutoff=0.4)
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """The known name that may be meant, in brackets, for a message; empty if none is near.
+
+    Args:
+        name: what the user wrote.
+        known: names that would have been right.
+    """
+    names = list(known)
+    meant = [each for each in _SYNONYMS.get(str(name), ()) if each in names]
+    nearest = meant or difflib.get_close_matches(str(name), names, n=1, cutoff=0.5)
     return f" (did you mean {nearest[0]!r}?)" if nearest else ""
 
 
@@ -118,7 +155,7 @@ def from_validation(
             problems.append(str(problem["ctx"]["error"]))  # says itself what was given and where
             continue
         if problem["type"] == "extra_forbidden":
-            message = f"unknown field{_nearest(str(problem['loc'][-1]), known_fields)}"
+            message = f"unknown field{suggestion(str(problem['loc'][-1]), known_fields)}"
         problems.append(f"{field}{given}: {message}" if field else message)
     return RequestError(f"{where}: " + "; ".join(problems))
 

@@ -48,9 +48,11 @@ def checked_class(kind: Any, where: str) -> type:
     if not (isinstance(kind, type) and hasattr(kind, "_fields")):
         raise RequestError(f"{where} is {kind!r}; a NamedTuple class is needed")
     try:
-        get_type_hints(kind)
+        hints = get_type_hints(kind, include_extras=True)
     except Exception as error:  # whatever looking up a written name comes to
         raise RequestError(f"{where}: the types of its fields cannot be found: {error}") from error
+    if any(kind.__annotations__.get(field, hint) is not hint for field, hint in hints.items()):
+        kind.__annotations__ = hints  # written as texts, they would mean nothing elsewhere
     return kind
 
 

@@ -28,14 +28,15 @@ from qbumpers.decisions import (
     situate,
     step_of,
 )
-from qbumpers.errors import RequestError, action_number
+from qbumpers.errors import RequestError, action_number, counted
 from qbumpers.learners import Perception, perceive, perception
 from qbumpers.registration import as_numbers
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.values import QValues, check_width
-from qbumpers.values.fitting import Use, check_fit
+from qbumpers.values.fitting import Use
 from qbumpers.values.others import further_values
+from qbumpers.values.tabular import as_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
 _perceive = uncompiled(perceive)
@@ -50,9 +51,9 @@ class Session:
 
     Args:
         assistant: what decides, a rule with its options.
-        values: Q* of the assistant, any callable from a state or observation to one value per
-            action; with `others`, a mapping of further ones by name, if the assistant's rule named
-            any.
+        values: Q* of the assistant: an array [S, A] with the model's discount, or any callable from
+            a state or observation to one value per action; with `others`, a mapping of further ones
+            by name, if the assistant's rule named any.
         model: of the task, for rules with memory; its `actions` and `discount` hold for all.
         perceived: what the learner believes happened, a `Perception` or the name of one; it decides
             what the records say is credited.
@@ -74,13 +75,13 @@ class Session:
     def __init__(
         self,
         assistant: Assistant,
-        values: QValues,
+        values: QValues | np.ndarray,
         model: Model,
         perceived: Perception | str = "transition",
     ) -> None:
-        self.assistant, self.values, self.model = assistant, values, model
-        check_fit(values, _use_of(model, values))
-        stated = getattr(values, "discount", None)
+        self.assistant, self.model = assistant, model
+        self.values = as_values(values, _use_of(model, values))
+        stated = getattr(self.values, "discount", None)
         if stated is not None and stated != model.discount:
             raise RequestError(
                 f"discount = {model.discount!r} of the model, but the values were made with "
@@ -88,7 +89,9 @@ class Session:
             )
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
-        self._others = [further_values(values, name, assistant.name) for name in assistant.values]
+        self._others = [
+            further_values(self.values, name, assistant.name) for name in assistant.values
+        ]
         self._memory = assistant.start(model)
         self._episode = -1
         self.account = Account(0.0, 1.0, 0.0, 0, 0)
@@ -199,7 +202,8 @@ class Session:
 
 def _use_of(model: Model, values: Any) -> Use:
     """What a model says of what values are put to."""
-    use = Use("the model", model.states, model.observation_size, model.actions)
+    sizes = (model.states, model.observation_size, model.actions)
+    use = Use("the model", *sizes, discount=model.discount)
     if model.dynamics is None or not getattr(values, "made_for", ""):
         return use
     return use._replace(identity=transitions_digest(model.dynamics))
@@ -256,7 +260,8 @@ def replay(session: Session, stepper: Any, log: Step | Iterable[Step]) -> int:
     steps = list(rows_of(log) if isinstance(log, Step) else log)
     if steps and not int(steps[-1].events) & _ENDS:
         raise ReplayError(
-            f"replay: the log ends after {len(steps)} steps, before its last episode does"
+            f"replay: the log ends after {counted(len(steps), 'step')}, before its last episode "
+            "does"
         )
     over = True
     for number, recorded in enumerate(steps):

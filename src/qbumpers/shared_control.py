@@ -1,5 +1,6 @@
 """The Gymnasium wrapper: a person's or an agent's action goes in, the assisted one is executed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,20 +9,23 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.assistants.registry import registered
 from qbumpers.borrowing import read_only
 from qbumpers.decisions import Model, Noise, Step
-from qbumpers.errors import RequestError, action_number, check_number
+from qbumpers.errors import RequestError, action_number, check_number, suggestion, unknown_name
 from qbumpers.learners import Perception
 from qbumpers.session import Session
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.identity import task_inside
 from qbumpers.tasks.undoing import reached_limit, undo_of
 from qbumpers.values import QValues, TabularValues, load_values
-from qbumpers.values.fitting import check_fit, use_in
+from qbumpers.values.fitting import use_in
+from qbumpers.values.tabular import as_values
 
 RECORD, SUMMARY = "assistance", "assisted_episode"
 """Keys of `info`: the record of every step, and the summary at the end of an episode."""
 
+_OWN = ("discount", "perception")  # arguments beside those of the assistant
 _NOISE_DRAWN = 256  # decisions for which noise is drawn at a time
 
 
@@ -44,8 +48,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     Args:
         env: an environment with a Discrete action space.
         assistant: an assistant, or the name of one, its options then being given by `options`.
-        values: Q* of the assistant, any callable from an observation to one value per action; or
-            the path of a file written by `TabularValues.save`.
+        values: Q* of the assistant: an array [S, A], any callable from an observation to one value
+            per action, or the path of a file written by `TabularValues.save`.
         discount: of the values, in (0, 1]; needed if the values do not state their own.
         perception: learner model for the record's `credited` action, a `Perception` or its name.
         **options: of the assistant, for instance `alpha=0.7`.
@@ -61,7 +65,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self,
         env: gymnasium.Env[Any, Any],
         assistant: Assistant | str,
-        values: QValues | str | Path,
+        values: QValues | np.ndarray | str | Path,
         *,
         discount: float | None = None,
         perception: Perception | str = "transition",
@@ -81,11 +85,12 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             raise RequestError(
                 f"options {sorted(options)} go with an assistant's name, not with an Assistant"
             )
+        _check_names(assistant, options)
         self.assistant = (
             assistant if isinstance(assistant, Assistant) else make_assistant(assistant, **options)
         )
-        self.values: QValues = load_values(values) if isinstance(values, str | Path) else values
-        self.discount = _discount_of(self.values, discount)
+        given: Any = load_values(values) if isinstance(values, str | Path) else values
+        self.discount = _discount_of(given, discount)
         self.perception = perception
         self._actions = int(env.action_space.n)
         self._first_action = int(env.action_space.start)
@@ -98,10 +103,8 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._undo = undo_of(env) if "undo" in self.assistant.needs else None
         model = self._model()
         name = str(env.spec.id if env.spec else env)
-        check_fit(
-            self.values,
-            use_in(env, name, model.states, model.observation_size, self.values),
-        )
+        use = use_in(env, name, model.states, model.observation_size, given)
+        self.values: QValues = as_values(given, use._replace(discount=self.discount))
         values = _from_zero(self.values, self._first_state)
         self._session = Session(self.assistant, values, model, perception)
 
@@ -264,6 +267,16 @@ class _FromZero:
 def _from_zero(values: QValues, first: int) -> QValues:
     """Values of states that count from 0; a table's do already."""
     return values if not first or isinstance(values, TabularValues) else _FromZero(values, first)
+
+
+def _check_names(assistant: Assistant | str, options: Mapping[str, Any]) -> None:
+    """RequestError for an option that means an argument of the wrapper itself."""
+    if options and not isinstance(assistant, Assistant):
+        kind: Any = registered(assistant).options_type
+        fields: tuple[str, ...] = kind._fields
+        for option in options:
+            if option not in fields and suggestion(option, _OWN):
+                raise unknown_name("argument", option, [*_OWN, *fields])
 
 
 def _checked_noise(noise: Any) -> list[list[float]]:

@@ -1,5 +1,7 @@
 """The time left of a run: as expected at first, then as its trials have taken."""
 
+import contextlib
+
 import pytest
 
 from qbumpers.cli.progress import Before, TrialProgress, rate, time_left
@@ -42,12 +44,29 @@ def test_a_rate_is_told_in_the_unit_that_suits_it(steps, text):
     assert rate(steps, 10.0) == text
 
 
+def test_the_bar_of_a_race_that_ends_early_ends_at_its_end(capsys):
+    with TrialProgress("racing", lambda progress: None) as bar:
+        first = RunProgress(trials=0, of=40, steps=0, expected=1.0, damaged=[], changed=[])
+        bar.show(first)
+        bar.show(first._replace(trials=9, steps=100))
+    assert "9 of 9 trials" in capsys.readouterr().out
+
+
+def test_a_bar_that_is_stopped_stays_where_it_is(capsys):
+    first = RunProgress(trials=1, of=40, steps=0, expected=1.0, damaged=[], changed=[])
+    with contextlib.suppress(EOFError), TrialProgress("racing", lambda progress: None) as bar:
+        bar.show(first)
+        raise EOFError
+    assert "1 of 40 trials" in capsys.readouterr().out
+
+
 def test_the_bar_shows_trials_the_rate_and_the_time_left(capsys):
     announced = []
-    with TrialProgress("simulating", announced.append) as bar:
-        first = RunProgress(trials=0, of=4, steps=0, expected=7200.0, damaged=[], changed=[])
+    first = RunProgress(trials=0, of=4, steps=0, expected=7200.0, damaged=[], changed=[])
+    with contextlib.suppress(EOFError), TrialProgress("simulating", announced.append) as bar:
         bar.show(first)
         bar.show(first._replace(trials=1, steps=500_000))
+        raise EOFError  # or the bar would go on to its end
     assert announced == [first]
     shown = capsys.readouterr().out
     assert "1 of 4 trials" in shown

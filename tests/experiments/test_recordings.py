@@ -1,5 +1,8 @@
 """Recorded steps as Minari reads them back, against the run's own tables."""
 
+import warnings
+from contextlib import closing
+
 import numpy as np
 import polars as pl
 import pytest
@@ -12,10 +15,12 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.recordings import INFOS, _episodes, export_recording
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
+from qbumpers.experts import ExpertWarning
 from qbumpers.tasks import registry
 from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from tests.experiments.examples import run_into
 from tests.tasks.lakes import Tabled
+from tests.values.networks import network_of
 
 minari = pytest.importorskip("minari")
 
@@ -106,6 +111,53 @@ def test_infos_have_one_structure_with_an_entry_for_the_reset(recorded):
         assert (infos["overridden"][1:] == different).all()
         if row["retention"]:
             assert (infos["probability"][1:] == 0).all()
+
+
+def plan_of(task, **changes):
+    assistants = [{"name": "none"}]
+    settings = {"name": "kept", "task": task, "assistants": assistants, "trials": 1, "episodes": 1}
+    return make_plan(make_experiment(settings | changes))
+
+
+SPECS = {
+    "cliff-walking": ("cliff-walking", "qbumpers/CliffWalking-v0", 100, {}),
+    "lunar-lander": (
+        {"name": "lunar-lander", "arguments": {"seed": 3}}, "qbumpers/LunarLander-v0", 1000,
+        {"seed": 3},
+    ),
+    "a lake": (
+        {"name": "FrozenLake-v1", "discount": 0.9, "episode_limit": 30,
+         "arguments": {"is_slippery": False}},
+        "FrozenLake-v1", 30, {"is_slippery": False},
+    ),
+    "a pole": ({"name": "CartPole-v1", "discount": 0.9}, "CartPole-v1", 500, {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("task", "name", "limit", "arguments"), SPECS.values(), ids=list(SPECS))
+def test_the_environment_can_be_made_again_from_a_dataset(
+    tmp_path, monkeypatch, task, name, limit, arguments
+):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    values = {}
+    if name == "CartPole-v1":
+        network_of(inputs=4, actions=2, task=name).save(tmp_path / "values.npz")
+        values = {"values": str(tmp_path / "values.npz")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ExpertWarning)  # of a random network
+        plan = plan_of(task, **values)
+        run_experiment(plan, tmp_path / "out", backend=ThisMachine(1))
+        export_recording(tmp_path / "out", "none", "again/none-v0")
+    dataset = minari.load_dataset("again/none-v0")
+    with closing(dataset.recover_environment()) as environment:
+        assert environment.spec.id == name
+        assert environment.spec.max_episode_steps == limit
+        for argument, value in arguments.items():
+            assert environment.unwrapped.spec.kwargs[argument] == value
+        assert environment.action_space == dataset.action_space
+        first, _ = environment.reset(seed=0)
+        assert environment.observation_space.contains(first)
+        assert np.shape(first) == np.shape(dataset[0].observations[0])
 
 
 WRONG = {

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 from qbumpers import make_task
+from qbumpers.simulation import make_condition
 from qbumpers.simulation.workers import make_pool
+from tests.values.networks import network_of
 
 ROLLUP = Path("/proc/self/smaps_rollup")
 
@@ -23,8 +25,11 @@ def memory(_):
 
 @pytest.mark.skipif(not ROLLUP.exists(), reason="the system does not tell what memory is shared")
 def test_processes_share_the_libraries_that_they_need():
-    with make_pool(make_task("CartPole-v1", discount=0.99), 2) as pool:
-        sizes = list(pool.map(memory, range(8)))
+    condition = make_condition(
+        make_task("CartPole-v1", discount=0.99), "none", values=network_of(inputs=4)
+    )
+    with make_pool({"": condition}, 2) as pool:
+        sizes = list(pool.executor.map(memory, range(8)))
     assert multiprocessing.active_children() == []
     for resident, alone in sizes:
         assert resident > 70e6  # Numba and NumPy are loaded,

@@ -1,7 +1,12 @@
 """Tasks by name."""
 
+from typing import Any, cast
+
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium import wrappers
+from gymnasium.envs.classic_control.cartpole import CartPoleEnv
 
 from qbumpers import RequestError
 from qbumpers.tasks import (
@@ -83,6 +88,106 @@ def test_a_registered_task_may_take_arguments():
     assert make_task("a-task-with-arguments", states=4).states == 4
     with pytest.raises(RequestError, match=r"'states'; its arguments are: states"):
         make_task("a-task-with-arguments")
+
+
+def test_an_environment_stands_for_its_name():
+    made = gymnasium.make("CartPole-v1", sutton_barto_reward=True, render_mode="rgb_array")
+    task = make_task(made, discount=0.9)
+    named = make_task("CartPole-v1", discount=0.9, sutton_barto_reward=True)
+    assert task.digest() == named.digest()
+    assert task.identity() == named.identity()
+    lake = make_task(gymnasium.make("FrozenLake-v1", is_slippery=False), discount=0.9)
+    assert lake.digest() == make_task("FrozenLake-v1", discount=0.9, is_slippery=False).digest()
+
+
+def rewards_of(task, steps=5):
+    stepper = task.make_stepper()
+    stepper.reset(0.5)
+    return [stepper.step(0)[1] for _ in range(steps)]
+
+
+def halved():
+    return wrappers.TransformReward(gymnasium.make("CartPole-v1"), lambda reward: float(reward) / 2)
+
+
+def test_wrappers_of_an_environment_are_made_again():
+    clipped = wrappers.ClipReward(gymnasium.make("CartPole-v1", max_episode_steps=30), 0, 0.25)
+    task = make_task(clipped, discount=0.9)
+    assert rewards_of(task) == [0.25] * 5
+    assert task.episode_limit == 30
+    participants = task.make_environment(render_mode="rgb_array")
+    assert participants.render_mode == "rgb_array"
+    participants.reset(seed=0)
+    assert participants.step(0)[1] == 0.25
+    assert task.digest() != make_task("CartPole-v1", discount=0.9, episode_limit=30).digest()
+
+
+def test_a_function_or_class_makes_the_environment():
+    task = make_task(halved, discount=0.9)
+    assert rewards_of(task) == [0.5] * 5
+    assert (task.name, task.episode_limit) == ("CartPole-v1", 500)
+    assert make_task(halved, discount=0.9, max_episode_steps=8).episode_limit == 8
+    pole = make_task(CartPoleEnv, discount=0.9, episode_limit=9, sutton_barto_reward=True)
+    assert rewards_of(pole) == [0.0] * 5
+    environment = pole.make_environment()
+    environment.reset(seed=0)
+    ends = [environment.step(step % 2)[3] for step in range(9)]
+    assert ends == [False] * 8 + [True]
+    lake = make_task(lambda: gymnasium.make("FrozenLake-v1", is_slippery=False), discount=0.9)
+    assert lake.digest() == make_task("FrozenLake-v1", discount=0.9, is_slippery=False).digest()
+
+
+class Own(gymnasium.RewardWrapper):
+    def reward(self, reward):
+        return reward
+
+
+UNUSABLE = {
+    "no environment": (
+        lambda: make_task(cast(Any, lambda: 3), discount=0.9),
+        "it makes 3; a Gymnasium environment is needed",
+    ),
+    "fails": (
+        lambda: make_task(cast(Any, lambda: 1 / 0), discount=0.9),
+        "no environment is made: ZeroDivisionError: division by zero",
+    ),
+    "takes none": (lambda: make_task(halved, discount=0.9, size=3), "halved: .*'size'"),
+    "no discount": (lambda: make_task(halved), "task halved: discount is missing"),
+    "gamma": (
+        lambda: make_task("FrozenLake-v1", gamma=0.9),
+        r"unknown argument of task 'FrozenLake-v1' 'gamma' \(did you mean 'discount'\?\)",
+    ),
+    "made already": (
+        lambda: make_task(gymnasium.make("CartPole-v1"), discount=0.9, sutton_barto_reward=True),
+        "sutton_barto_reward cannot be given; the environment is made already",
+    ),
+    "no spec": (lambda: make_task(CartPoleEnv(), discount=0.9), "CartPoleEnv is not of gymnasium"),
+    "a wrapper": (
+        lambda: make_task(Own(gymnasium.make("CartPole-v1")), discount=0.9),
+        "cannot make wrapper Own again; give a function",
+    ),
+    "two limits": (
+        lambda: make_task("CartPole-v1", discount=0.9, episode_limit=3, max_episode_steps=4),
+        "max_episode_steps = 4; episode_limit = 3 means the same",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("ask", "message"), UNUSABLE.values(), ids=list(UNUSABLE))
+def test_what_gives_no_environment_is_named(ask, message):
+    with pytest.raises(RequestError, match=message) as caught:
+        ask()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["FrozenLake-v1", "CartPole-v1"])
+def test_the_limit_has_two_words(name):
+    tasks = [
+        make_task(name, discount=0.9, **{word: 7})
+        for word in ("episode_limit", "max_episode_steps")
+    ]
+    assert tasks[0].digest() == tasks[1].digest()
+    assert tasks[0].episode_limit == 7
 
 
 def test_an_environment_without_a_limit_needs_one():

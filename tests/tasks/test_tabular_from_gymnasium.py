@@ -124,7 +124,7 @@ def test_the_id_of_an_environment_is_none():
 def test_an_environment_without_a_start_is_refused():
     lake = FrozenLakeEnv()
     del lake.initial_state_distrib
-    with pytest.raises(RequestError, match="has no attribute initial_state_distrib"):
+    with pytest.raises(RequestError, match="transitions P but no initial_state_distrib: set"):
         TabularTask.from_gymnasium(lake, discount=0.9, episode_limit=5)
 
 

@@ -29,6 +29,7 @@ from qbumpers.experts.loading import load_table
 from qbumpers.experts.quality import check_table
 from qbumpers.experts.tables import check_exactness
 from qbumpers.session import Session
+from qbumpers.simulation import make_condition
 from qbumpers.values import learn_values
 from tests.tasks.examples import random_task
 from tests.tasks.lakes import Tabled, frozen
@@ -40,6 +41,7 @@ MIRRORED = make_task(
     "FrozenLake-v1", discount=0.99, is_slippery=False, desc=["SFFF", "FFFH", "FHFH", "HFFG"]
 )
 POLE = make_task("CartPole-v1", discount=0.99)
+TABLE = solve(SMALL).table
 NETWORK = network_of(inputs=4, actions=2, task="CartPole-v1")
 
 
@@ -99,7 +101,7 @@ def test_values_in_their_place_are_taken(host):
     host(POLE, dataclasses.replace(NETWORK, made_for=POLE.identity()))
 
 
-@pytest.mark.parametrize("values", [solve(SMALL).table, "values.npz", 7])
+@pytest.mark.parametrize("values", [solve(SMALL).table.tolist(), "values.npz", 7])
 def test_what_is_no_function_is_refused(values):
     message = r"values = .* a table \[16, 4\] is needed for task .*: TabularValues makes it of an"
     with pytest.raises(RequestError, match=message) as caught:
@@ -108,6 +110,42 @@ def test_what_is_no_function_is_refused(values):
     if not isinstance(values, str):  # the path of a file will do there
         with pytest.raises(RequestError, match="is needed for environment FrozenLake-v1"):
             SharedControl(frozen(), "maximal", values, discount=0.9)
+
+
+def test_an_array_is_a_table_of_the_task():
+    found = [in_a_simulation(SMALL, values).outcomes for values in (TABLE, solve(SMALL))]
+    for array, table in zip(*found, strict=True):
+        assert (array == table).all()
+    assert make_condition(SMALL, "maximal", values=TABLE).content() == (
+        make_condition(SMALL, "maximal", values=solve(SMALL)).content()
+    )
+    shared = SharedControl(frozen(), "maximal", TABLE, discount=0.99)
+    _, info = shared.reset(seed=0)
+    assert (info["assistance"]["values"] == TABLE[0]).all()
+    model = Model(16, 0, 4, -1, 0.99, SMALL.dynamics(), SMALL.distance)
+    session = Session(make_assistant("maximal"), TABLE, model)
+    session.begin(3)
+    assert (session.values_now == TABLE[3]).all()
+    assert check_table(SMALL, TABLE, discount=0.99).equals(
+        check_table(SMALL, solve(SMALL), discount=0.99)
+    )
+
+
+def test_an_array_of_another_size_is_refused():
+    message = r"a table \[16, 3\]; .* needs a table \[16, 4\]"
+    model = Model(16, 0, 4, -1, 0.99, SMALL.dynamics(), SMALL.distance)
+    for ask in (
+        lambda: in_a_simulation(SMALL, TABLE[:, :3]),
+        lambda: SharedControl(frozen(), "maximal", TABLE[:, :3], discount=0.99),
+        lambda: Session(make_assistant("maximal"), TABLE[:, :3], model),
+        lambda: check_table(SMALL, TABLE[:, :3], discount=0.99),
+    ):
+        with pytest.raises(RequestError, match=message):
+            ask()
+    with pytest.raises(RequestError, match="needs a network of 4 inputs"):
+        in_a_simulation(POLE, TABLE)
+    with pytest.raises(RequestError, match="discount is missing: the values state none"):
+        SharedControl(frozen(), "maximal", TABLE)
 
 
 @pytest.mark.parametrize(

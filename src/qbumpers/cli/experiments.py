@@ -17,8 +17,8 @@ from qbumpers.cli.console import (
     typeable,
 )
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import On, Out, Workers, backend_for
-from qbumpers.errors import RequestError
+from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
+from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
     import polars as pl
@@ -53,6 +53,28 @@ Alphas = Annotated[
         help="Of every assistant that has an alpha, for example 0.5,0.8,1.",
         show_default="the paper's",
         metavar="A,A,...",
+    ),
+]
+OwnTrials = Annotated[
+    int | None,
+    typer.Option(
+        "--trials",
+        help="Simulated learners per condition.",
+        show_default="the file's",
+        metavar="N",
+        min=1,
+    ),
+]
+OwnEpisodes = Annotated[
+    int | None,
+    typer.Option(
+        "--episodes", help="Of each trial.", show_default="the file's", metavar="N", min=1
+    ),
+]
+OwnSeed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed", help="Of all random streams.", show_default="the file's", metavar="N", min=0
     ),
 ]
 Values = Annotated[
@@ -126,6 +148,10 @@ def run(
     experiment: Annotated[
         Path, typer.Argument(help="An experiment file.", metavar="EXPERIMENT.toml")
     ],
+    trials: OwnTrials = None,
+    episodes: OwnEpisodes = None,
+    seed: OwnSeed = None,
+    imports: Imports = None,
     workers: Workers = None,
     on: On = None,
     out: Out = None,
@@ -140,11 +166,16 @@ def run(
     computes only what is new.
 
     Example: qbumpers run frozen-lake.toml --out results/frozen-lake
+
+    Example: qbumpers run frozen-lake.toml --trials 5 --episodes 20 --out results/quick
     """
     from qbumpers.experiments.sources import load_experiment
 
     with stoppable():
-        _run(load_experiment(experiment, large=yes), workers, on, out)
+        given = {"trials": trials, "episodes": episodes, "seed": seed}
+        changes = {field: number for field, number in given.items() if number is not None}
+        design = load_experiment(experiment, large=yes, imports=imports or (), changes=changes)
+        _run(design, workers, on, out)
 
 
 @application.command()
@@ -171,8 +202,9 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
     folder = out or f"results/{experiment.name}"
     more = f" and {experiment.retention} without the assistant" if experiment.retention else ""
     OUTPUT.print(
-        f"[bold]{experiment.name}[/bold]: {len(plan.named)} conditions, {experiment.trials} "
-        f"trials of {experiment.episodes} episodes{more}, into {escape(folder)}",
+        f"[bold]{experiment.name}[/bold]: {counted(len(plan.named), 'condition')}, "
+        f"{counted(experiment.trials, 'trial')} of {counted(experiment.episodes, 'episode')}"
+        f"{more}, into {escape(folder)}",
         soft_wrap=True,
     )
     with backend_for(workers, on) as backend, TrialProgress("simulating", _announce) as progress:
@@ -182,12 +214,15 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
 
 def _announce(done: "RunProgress") -> None:
     if done.trials == done.of:
-        OUTPUT.print("All trials are there already.")
+        OUTPUT.print(
+            "All trials are there already." if done.of > 1 else "The trial is there already."
+        )
         return
-    there = f"{done.trials:,} are there already, " if done.trials else ""
+    verb = "is" if done.trials == 1 else "are"
+    there = f"{done.trials:,} {verb} there already, " if done.trials else ""
     missing = f"{done.of - done.trials:,} to run"
     expected = f"{duration(done.expected)} by a short calibration"
-    OUTPUT.print(f"{done.of:,} trials: {there}{missing}, {expected}")
+    OUTPUT.print(f"{counted(done.of, 'trial')}: {there}{missing}, {expected}")
 
 
 def _analyse(folder: str) -> None:

@@ -11,7 +11,9 @@ from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, table
+from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError
+from qbumpers.imports import import_modules, module_and_name
 
 if TYPE_CHECKING:
     import polars as pl
@@ -81,6 +83,7 @@ def expert(
     out: Out = None,
     corrected: Corrected = None,
     discount: Discount = None,
+    imports: Imports = None,
     seeds: Seeds = 10,
     steps: Steps = 400_000,
     activation: Activation = "tanh",
@@ -105,11 +108,12 @@ def expert(
     from qbumpers.experts.selecting import make_recipe
     from qbumpers.tasks import make_task
 
+    import_modules(imports or (), "--import")
     made = make_task(task, discount=discount)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     _check_conversion(made, check, convert, statistics)
-    path = out or Path(f"{task.replace('/', '-')}.npz")
+    path = out or Path(f"{module_and_name(task)[1].replace('/', '-')}.npz")
     for option, place in {"--out": out, "--corrected": corrected}.items():
         if place is not None:
             _check_place(option, place)
@@ -200,6 +204,7 @@ def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None
             bar.update(shown, completed=done, description=f"steps, seed {seed}")
 
         found = train_best(task, recipe, seeds, path, report)
+        bar.update(shown, completed=recipe.steps * len(seeds))
     OUTPUT.print(_judgements(task, seeds, found.judgements))
     with expert_warnings_printed():
         check_expert(task, found.values)
@@ -288,6 +293,7 @@ def _correct(task: "Task", path: Path, out: Path) -> None:
             branches=correcting.BRANCHES,
             report=lambda done: bar.update(shown, completed=done),
         )
+        bar.update(shown, completed=correcting.BRANCHES)
     found.values.save(out)
     OUTPUT.print(
         f"- In states held out the error was {_with_error(found.before.absolute)} in size, now "

@@ -1,13 +1,17 @@
 """`qbumpers list`."""
 
+import functools
 from typing import Annotated, Any, cast
 
+import gymnasium
 import typer
 from rich.table import Table
 
 from qbumpers.cli.application import application
 from qbumpers.cli.console import OUTPUT, table
+from qbumpers.cli.working import Imports
 from qbumpers.errors import unknown_name
+from qbumpers.imports import import_modules
 
 
 @application.command("list")
@@ -15,16 +19,18 @@ def list_names(
     what: Annotated[
         str, typer.Argument(help="What to list.", metavar="assistants|tasks|learners|perceptions")
     ] = "assistants",
+    imports: Imports = None,
 ) -> None:
     """List what experiments can name."""
     listings = {
         "assistants": _list_assistants,
-        "tasks": _list_tasks,
+        "tasks": functools.partial(_list_tasks, set(gymnasium.registry)),
         "learners": _list_learners,
         "perceptions": _list_perceptions,
     }
     if what not in listings:
         raise unknown_name("list", what, listings)
+    import_modules(imports or (), "--import")
     OUTPUT.print(listings[what]())
 
 
@@ -41,16 +47,25 @@ def _list_assistants() -> Table:
     return listing
 
 
-def _list_tasks() -> Table:
-    from qbumpers.tasks.registry import tabular_environments, task_names, vector_environments
+def _list_tasks(before: set[str]) -> Table:
+    from qbumpers.tasks.registry import (
+        own_tasks,
+        tabular_environments,
+        task_names,
+        vector_environments,
+    )
+
+    own = own_tasks()
 
     listing = table("task", "what it is")
     for name in task_names():
-        listing.add_row(name, "a task of this package")
+        listing.add_row(name, "a task of your own" if name in own else "a task of this package")
     for name in tabular_environments():
         listing.add_row(name, "a Gymnasium environment with a transition table; give a discount")
     for name in vector_environments():
         listing.add_row(name, "a Gymnasium environment observed as a vector; give a discount")
+    for name in sorted(set(gymnasium.registry) - before):
+        listing.add_row(name, "an environment of an imported module; give a discount")
     return listing
 
 

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.text import Text
 
 from qbumpers.cli.console import ERRORS, OUTPUT, duration
+from qbumpers.errors import counted
 
 if TYPE_CHECKING:
     from qbumpers.experiments.run import RunProgress
@@ -30,7 +31,7 @@ class TrialProgress:
         columns = (
             rich.progress.TextColumn("{task.description}"),
             rich.progress.BarColumn(),
-            rich.progress.TextColumn("{task.completed:,.0f} of {task.total:,.0f} trials"),
+            rich.progress.TextColumn("{task.completed:,.0f} of {task.fields[whole]}"),
             rich.progress.TextColumn("{task.fields[rate]}"),
             _TimeLeft(),
         )
@@ -50,6 +51,10 @@ class TrialProgress:
         traceback: TracebackType | None,
     ) -> None:
         self._waiting.stop()
+        if kind is None:  # a race, which may need fewer trials, is at its end too
+            for each in self._bar.tasks:
+                done = int(each.completed)
+                self._bar.update(each.id, total=done, ends=None, whole=counted(done, "trial"))
         self._bar.stop()
 
     def show(self, done: "RunProgress | TuningProgress") -> None:
@@ -65,7 +70,9 @@ class TrialProgress:
             self._bar.start()
             expected = getattr(done, "expected", None)  # a race cannot tell
             self._before = Before(done.trials, expected)
-            self._task = self._bar.add_task(self._what, total=done.of, rate="", ends=None)
+            self._task = self._bar.add_task(
+                self._what, total=done.of, rate="", ends=None, whole=counted(done.of, "trial")
+            )
         seconds = max(time.monotonic() - self._begun, 1e-3)
         left = time_left(self._before, done.trials, done.of, seconds)
         self._bar.update(

@@ -10,7 +10,8 @@ from rich.table import Table
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import On, Out, Workers, backend_for
+from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
+from qbumpers.errors import counted
 
 if TYPE_CHECKING:
     from qbumpers.tuning import Contender, Tuning
@@ -28,6 +29,7 @@ def tune(
     confidence: Annotated[
         float, typer.Option(help="That the choice is above the floor.", metavar="SHARE")
     ] = 0.95,
+    imports: Imports = None,
     workers: Workers = None,
     on: On = None,
     out: Out = None,
@@ -46,12 +48,13 @@ def tune(
 
     with stoppable():
         with expert_warnings_printed():
-            plan = make_plan(load_experiment(experiment))
+            plan = make_plan(load_experiment(experiment, imports=imports or ()))
         folder = out or f"results/{plan.experiment.name}"
+        verb = "races" if len(plan.named) == 1 else "race"
         OUTPUT.print(
-            f"[bold]{plan.experiment.name}[/bold]: {len(plan.named)} conditions race, up to "
-            f"{plan.experiment.trials} trials of {plan.experiment.episodes} episodes each, into "
-            f"{escape(folder)}",
+            f"[bold]{plan.experiment.name}[/bold]: {counted(len(plan.named), 'condition')} {verb}, "
+            f"up to {counted(plan.experiment.trials, 'trial')} of "
+            f"{counted(plan.experiment.episodes, 'episode')} each, into {escape(folder)}",
             soft_wrap=True,
         )
         with (
@@ -85,7 +88,9 @@ def _contenders(found: "Tuning") -> Table:
 
 def _cost(found: "Tuning") -> str:
     share = found.trials / found.grid_trials
-    return f"{found.trials:,} trials, {share:.0%} of the full grid's {found.grid_trials:,}."
+    return (
+        f"{counted(found.trials, 'trial')}, {share:.0%} of the full grid's {found.grid_trials:,}."
+    )
 
 
 def _no_choice(found: "Tuning") -> str:

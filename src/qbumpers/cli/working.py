@@ -12,6 +12,14 @@ from qbumpers.errors import RequestError
 if TYPE_CHECKING:
     from qbumpers.experiments.run import Backend
 
+Imports = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--import",
+        help="Import this first: it registers tasks, assistants or learners. May be repeated.",
+        metavar="MODULE",
+    ),
+]
 Workers = Annotated[
     int | None, typer.Option(help="Cores to use.", show_default="all cores", metavar="N", min=1)
 ]

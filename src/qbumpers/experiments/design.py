@@ -26,6 +26,7 @@ from qbumpers.experiments.learner_designs import (
 )
 from qbumpers.experiments.models import Model
 from qbumpers.experiments.sweeps import combinations, options_listed, swept, tables_listed
+from qbumpers.imports import import_modules
 from qbumpers.learners import learners
 from qbumpers.tasks import Task, make_task
 
@@ -37,7 +38,8 @@ class TaskDesign(Model):
     """Which task: a registered one by name, or a Gymnasium environment.
 
     Attributes:
-        name: for instance "cliff-walking" or "FrozenLake-v1".
+        name: for instance "cliff-walking", "FrozenLake-v1", or "my_tasks:Maze-v0" after the module
+            that registers it.
         discount: gamma, in (0, 1], for a Gymnasium environment, which states none.
         episode_limit: of a Gymnasium environment, in steps; its own if left out.
         arguments: of the task, for instance `{ seed = 0 }` of "lunar-lander", or of a Gymnasium
@@ -114,6 +116,7 @@ class Experiment(Model):
         common_random_numbers: whether trials of equal number draw equal numbers in every condition,
             so that conditions can be compared trial by trial.
         seed: from which, with the content of each condition, all random streams come.
+        imports: modules that are imported first: they register what the experiment names.
     """
 
     name: Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
@@ -131,6 +134,7 @@ class Experiment(Model):
     criterion: Annotated[float, Field(allow_inf_nan=False)] | None = None
     common_random_numbers: bool = False
     seed: Annotated[int, Field(ge=0)] = 0
+    imports: list[str] = Field(default_factory=list)
 
     @model_validator(mode="before")
     @classmethod
@@ -138,6 +142,8 @@ class Experiment(Model):
         """What is left out or written shortly, in full; so are the settings of a finished run."""
         if not isinstance(settings, dict) or info.context == RECORDED:
             return settings
+        if isinstance(settings.get("imports"), list):
+            import_modules(settings["imports"], "imports")
         settings = {"learners": [{}], **settings}
         if isinstance(settings.get("task"), str):
             settings["task"] = {"name": settings["task"]}

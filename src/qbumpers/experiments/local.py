@@ -10,7 +10,7 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.simulation.cores import usable_cores
-from qbumpers.simulation.workers import make_pool, some_finished, submit
+from qbumpers.simulation.workers import make_pool, some_finished
 
 
 class ThisMachine:
@@ -41,15 +41,16 @@ class ThisMachine:
         Raises:
             ChildProcessError: if a process was lost, for instance for want of memory.
         """
+        if not seconds:
+            return
         remaining: Iterable[Cell] = iter(seconds)
         waiting: set[Future[Finished]] = set()
         try:
-            with make_pool(plan.task, min(self.cores, max(1, len(seconds)))) as pool:
+            with make_pool(plan.conditions, min(self.cores, len(seconds))) as pool:
                 while True:
                     # Few at a time, so that little is thrown away when the run is stopped.
                     for cell in itertools.islice(remaining, 2 * self.cores - len(waiting)):
-                        condition = plan.conditions[cell.content]
-                        waiting.add(submit(pool, finish, condition, cell, plan.experiment.seed))
+                        waiting.add(pool.submit(finish, cell.content, cell, plan.experiment.seed))
                     if not waiting:
                         return
                     done, waiting = some_finished(waiting)

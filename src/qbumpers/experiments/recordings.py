@@ -11,9 +11,10 @@ import numpy as np
 import polars as pl
 
 from qbumpers.decisions import Step
-from qbumpers.errors import RequestError, unknown_name
+from qbumpers.errors import RequestError, counted, unknown_name
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.store import kept_files, load
+from qbumpers.imports import import_modules
 from qbumpers.registration import files_from
 from qbumpers.simulation import record
 from qbumpers.tasks import Task
@@ -41,6 +42,9 @@ def export_recording(
     Q* and the files that options name are those that the folder keeps, and what is played is
     compared with the run.
 
+    The dataset says how Gymnasium makes the environment, if it can, for Minari's
+    `recover_environment`.
+
     Args:
         folder: output folder of the run.
         condition: a readable id in its `episodes.parquet`.
@@ -61,6 +65,9 @@ def export_recording(
             f"dataset = {dataset!r}; a name with a version, such as 'cliff/bumpers-v0', is needed"
         )
     results = load(folder)
+    if results.experiment.imports:  # so that what they register is known when it is read
+        import_modules(results.experiment.imports, f"imports of {folder}")
+        results = load(folder)
     noted = {each.condition: each for each in results.conditions}
     if condition not in noted:
         raise unknown_name("condition", condition, noted)
@@ -94,8 +101,9 @@ def _check_same(run: pl.DataFrame, episodes: Sequence[Mapping[str, Any]]) -> Non
         if now != then[1:] or not np.isclose(total, then[0], rtol=1e-9, atol=1e-9):
             raise RequestError(
                 f"trial {place[0]} is not what was run: in episode {place[1]} the return is "
-                f"{total:g} and was {then[0]:g}, with {now[1]} overrides in {now[0]} steps and "
-                f"{then[2]} in {then[1]}; the code, the task or a library changed since"
+                f"{total:g} and was {then[0]:g}, with {counted(now[1], 'override')} in "
+                f"{counted(now[0], 'step')} and {then[2]} in {then[1]}; the code, the task or a "
+                "library changed since"
             )
 
 
@@ -138,6 +146,7 @@ def _write(dataset: str, condition: str, task: Task, episodes: Sequence[Mapping[
             minari.create_dataset_from_buffers(
                 dataset,
                 [EpisodeBuffer(id=number, **episode) for number, episode in enumerate(episodes)],
+                env=task.environment_spec,
                 observation_space=task.observation_space,
                 action_space=task.action_space,
                 algorithm_name=condition,

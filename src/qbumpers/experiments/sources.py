@@ -3,15 +3,18 @@
 import codecs
 import math
 import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
 
-from qbumpers.errors import RequestError, from_validation
+from qbumpers.errors import RequestError, counted, from_validation
 from qbumpers.experiments.cells import MANY_CELLS, MOST_CELLS
 from qbumpers.experiments.design import Experiment, TaskDesign
 from qbumpers.experiments.learner_designs import RECORDED, field_names
+from qbumpers.imports import found_in
 
 
 def recorded_experiment(settings: dict[str, Any], where: str) -> Experiment:
@@ -33,7 +36,11 @@ def recorded_experiment(settings: dict[str, Any], where: str) -> Experiment:
 
 
 def make_experiment(
-    settings: dict[str, Any], where: str = "experiment", *, large: bool = False
+    settings: dict[str, Any],
+    where: str = "experiment",
+    *,
+    large: bool = False,
+    imports: Sequence[str] = (),
 ) -> Experiment:
     """An experiment from plain data, checked.
 
@@ -41,6 +48,7 @@ def make_experiment(
         settings: what a TOML file would hold.
         where: for messages, for example the path of the file.
         large: whether more than `MANY_CELLS` cells of work are meant.
+        imports: further modules that are imported first.
 
     Returns:
         The experiment.
@@ -48,6 +56,8 @@ def make_experiment(
     Raises:
         RequestError: naming each field that is wrong, its value and what is allowed.
     """
+    if imports:
+        settings = {**settings, "imports": [*settings.get("imports", []), *imports]}
     try:
         experiment = Experiment.model_validate(settings)
     except ValidationError as error:
@@ -56,8 +66,9 @@ def make_experiment(
     if cells > (MOST_CELLS if large else MANY_CELLS):
         refused = "is too many" if large else "must be asked for with --yes"
         raise RequestError(
-            f"{where}: {experiment.condition_count():,} conditions, together {cells:,} cells of "
-            f"work; more than {MOST_CELLS if large else MANY_CELLS:,} {refused}"
+            f"{where}: {counted(experiment.condition_count(), 'condition')}, together "
+            f"{counted(cells, 'cell')} of work; more than "
+            f"{MOST_CELLS if large else MANY_CELLS:,} {refused}"
         )
     try:
         experiment.conditions()
@@ -71,18 +82,27 @@ def _field_names() -> list[str]:
     return sorted({*field_names(), *(field for model in models for field in model.model_fields)})
 
 
-def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
+def load_experiment(
+    path: str | Path,
+    *,
+    large: bool = False,
+    imports: Sequence[str] = (),
+    changes: Mapping[str, Any] = MappingProxyType({}),
+) -> Experiment:
     """An experiment from a TOML file.
 
     Args:
-        path: where the file is.
+        path: where the file is; modules beside it can be imported.
         large: whether more than `MANY_CELLS` cells of work are meant.
+        imports: further modules that are imported first.
+        changes: what is to hold in place of fields of the file, by name.
 
     Returns:
         The experiment.
 
     Raises:
-        RequestError: if the file cannot be read, is no TOML, or a field is wrong.
+        RequestError: if the file cannot be read, is no TOML, a module cannot be imported, or a
+            field is wrong.
     """
     try:
         content = Path(path).read_bytes()
@@ -90,7 +110,9 @@ def load_experiment(path: str | Path, *, large: bool = False) -> Experiment:
         raise RequestError(f"experiment file {path}: {error.strerror or error}") from error
     settings = parsed(content, f"experiment file {path}")
     settings.pop("run", None)  # what an output folder adds: version, platform, time
-    return make_experiment(settings, f"experiment file {path}", large=large)
+    where = f"experiment file {path}"
+    with found_in([Path(path).parent, Path.cwd()]):
+        return make_experiment({**settings, **changes}, where, large=large, imports=imports)
 
 
 def parsed(content: bytes, where: str) -> dict[str, Any]:

@@ -41,7 +41,7 @@ from qbumpers.files import Folder, StoreError, open_folder
 from qbumpers.values import NetworkValues, TabularValues, decoded_values
 
 # An experiment may be continued with more or fewer of the first three, and be read in another way.
-_CHANGING = {"trials", "assistants", "learners", "criterion", "reproduces"}
+_CHANGING = {"trials", "assistants", "learners", "criterion", "reproduces", "imports"}
 
 _LIBRARIES = ("numpy", "numba", "scipy", "polars")
 

@@ -23,7 +23,7 @@ from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task
 from qbumpers.values.exact import reachable_states, solve
 from qbumpers.values.fitting import check_fit, use_at
-from qbumpers.values.tabular import QValues, check_width
+from qbumpers.values.tabular import QValues, as_values, check_width
 
 BEFORE_CRASH = (1, 2, 3, 5, 10, 20, 40)
 """Steps before a crash that are looked at."""
@@ -264,12 +264,12 @@ def bias_by(comparisons: pl.DataFrame, column: str, edges: Sequence[float]) -> p
     return pl.DataFrame(rows)
 
 
-def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame:
+def check_table(task: Task, values: QValues | np.ndarray, *, discount: float) -> pl.DataFrame:
     """Action values of a tabular task against the exact solution.
 
     Args:
         task: what the values are of.
-        values: any callable from the number of a state to a value per action.
+        values: an array [S, A], or any callable from the number of a state to a value per action.
         discount: that the values state, in (0, 1].
 
     Returns:
@@ -281,8 +281,8 @@ def check_table(task: Task, values: QValues, *, discount: float) -> pl.DataFrame
     """
     exact = solve(task, discount).table
     states = np.flatnonzero(reachable_states(cast(TabularTask, task)))
-    check_fit(values, use_at(task))
-    claimed = np.stack([check_width(values(int(s)), task.actions, f"in state {s}") for s in states])
+    called = as_values(values, use_at(task))
+    claimed = np.stack([check_width(called(int(s)), task.actions, f"in state {s}") for s in states])
     return pl.DataFrame(
         {
             "state": np.repeat(states, task.actions),

@@ -11,20 +11,21 @@ from qbumpers.learners import Motor, learner_for_settings, learner_type
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
 from qbumpers.values.events import EVENT_ROWS, event_values
-from qbumpers.values.fitting import check_fit, use_at
+from qbumpers.values.fitting import use_at
 from qbumpers.values.others import further_values
+from qbumpers.values.tabular import as_values
 
 
 def checked_values(
-    task: Task, assistant: Assistant, values: QValues | None
+    task: Task, assistant: Assistant, values: QValues | np.ndarray | None
 ) -> tuple[Any, Any, float]:
     """Q* as a condition keeps it, the further rows, and the discount.
 
     Args:
         task: what is to be learned.
         assistant: whose values they are.
-        values: None for the exact solution of a task with a table. Rows of `EVENT_ROWS` that values
-            of such a task lack are solved, too.
+        values: as `as_values` takes them; None for the exact solution of a task with a table. Rows
+            of `EVENT_ROWS` that values of such a task lack are solved, too.
 
     Raises:
         RequestError: if they do not fit the task, or an episode could start in a state that does
@@ -33,7 +34,7 @@ def checked_values(
     if not task.states:
         return _checked_network(task, assistant, values)
     source: Any = solve(task) if values is None else values
-    check_fit(source, use_at(task))
+    source = as_values(source, use_at(task))
     table = _table(task, source, "")
     others = np.zeros((task.states, len(assistant.values), task.actions))
     for place, name in enumerate(assistant.values):
@@ -62,10 +63,10 @@ def _table(task: Task, source: Any, name: str) -> np.ndarray:
 
 
 def _checked_network(
-    task: Task, assistant: Assistant, values: QValues | None
+    task: Task, assistant: Assistant, values: QValues | np.ndarray | None
 ) -> tuple[Any, Any, float]:
     if values is not None:
-        check_fit(values, use_at(task))
+        values = as_values(values, use_at(task))
     if not isinstance(values, NetworkValues):
         raise RequestError(
             f"values = {in_short(values)}; task {task.name} cannot be solved exactly: give a "

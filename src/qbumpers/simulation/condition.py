@@ -30,7 +30,7 @@ from qbumpers.simulation.checking import (
 from qbumpers.simulation.outcomes import Outcomes
 from qbumpers.simulation.packing import Own
 from qbumpers.tasks import Task
-from qbumpers.tasks.task import check_task
+from qbumpers.tasks.registry import Named, as_task
 from qbumpers.values import NetworkValues, QValues
 
 _FIRST_LEARNERS = ("q-learning", "double-dqn")  # what these seed does not name them
@@ -40,8 +40,8 @@ class Setup(TypedDict, total=False):
     """What `simulate` and `make_condition` take by name, beside task and assistant.
 
     Attributes:
-        values: Q* of the assistant; the exact solution of a task with a table if left out. Values
-            that state no discount are taken to have the task's.
+        values: Q* of the assistant, as an array [S, A] or a function; the exact solution of a task
+            with a table if left out. Values that state no discount are taken to have the task's.
         learner: settings of a registered learner, for instance `QLearner()`; the paper's, with the
             task's discount, if left out.
         perception: what the learner believes happened when it was overridden, a `Perception` or the
@@ -55,9 +55,10 @@ class Setup(TypedDict, total=False):
         retention: further episodes in which the learner goes on without the assistant, each
             followed by a greedy one; 0 if left out.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
+        discount: of a task that is given as a Gymnasium environment or its name; others state one.
     """
 
-    values: QValues | None
+    values: QValues | np.ndarray | None
     learner: Any
     perception: str | Perception
     penalty: float
@@ -66,6 +67,7 @@ class Setup(TypedDict, total=False):
     episodes: int
     retention: int
     common_random_numbers: bool
+    discount: float | None
 
 
 class Condition(NamedTuple):
@@ -194,11 +196,13 @@ def _file_digests(assistant: Assistant) -> list[str]:
     return own + (_file_digests(assistant.of) if assistant.of else [])
 
 
-def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup]) -> Condition:
+def make_condition(
+    task: Task | Named, assistant: Assistant | str, **setup: Unpack[Setup]
+) -> Condition:
     """Check everything that a simulation needs, before any of it runs.
 
     Args:
-        task: what is to be learned.
+        task: what is to be learned: a task, or what `make_task` makes one of.
         assistant: an assistant, or the name of one that needs no options.
         **setup: see `Setup`.
 
@@ -213,7 +217,7 @@ def make_condition(task: Task, assistant: Assistant | str, **setup: Unpack[Setup
     for name in setup:
         if name not in Setup.__annotations__:
             raise unknown_name("setting", name, Setup.__annotations__)
-    check_task(task)
+    task = as_task(task, setup.get("discount"))
     helper = assistant_of(assistant, "assistant")
     helper.check_task(task.name, had_by(task))
     found = checked_values(task, helper, setup.get("values"))

@@ -6,17 +6,18 @@ conditions as they are.
 
 import functools
 import pickle
-import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 from qbumpers.assistants import assistants, register_assistant
 from qbumpers.assistants.registry import Rule
 from qbumpers.compilation import compilation_settings, compiled_with, uncompiled
+from qbumpers.errors import RequestError
 from qbumpers.learners import LearnerType, learners, register_learner
 from qbumpers.registration import original_class
+from qbumpers.simulation.by_value import dumped
+from qbumpers.simulation.sending import Registered, cannot_be_sent
 from qbumpers.source import Meaning, meaning_of
 
 
@@ -63,13 +64,18 @@ class Own:
 
 
 def packed(conditions: Mapping[str, Any]) -> bytes:
-    """Pack conditions for a process that need not have the modules of users' rules and learners.
+    """Pack conditions for a process that need not have the modules of what they name.
+
+    Rules, learners, tasks and environments from outside this package are registered there.
 
     Args:
         conditions: `qbumpers.simulation.Condition`s, by any name.
 
     Returns:
         Bytes, which `pickle.loads` unpacks in a process that has this package.
+
+    Raises:
+        RequestError: naming what cannot be pickled.
     """
     own = [
         each
@@ -77,12 +83,39 @@ def packed(conditions: Mapping[str, Any]) -> bytes:
         for each in (*condition.assistant.chain, condition.learner_type)
         if not each.built_in
     ]
-    return _dumped(dict(conditions), list(dict.fromkeys(own)))
+    tasks = {f"task {each.task.name}": each.task.code for each in conditions.values()}
+    code = {f"{type(each).__name__} {each.name}": each.parts for each in own} | tasks
+    sent = _Sent(Registered(), dict(conditions))
+    try:
+        return dumped(sent, meaning_of(code).modules, map(_home, _parts(own)))
+    except RequestError:
+        raise
+    except Exception as error:  # each type has reasons of its own
+        raise cannot_be_sent(" or ".join(tasks), error) from error
+
+
+class _Sent(NamedTuple):
+    """Conditions, and what is to be registered before they are unpickled."""
+
+    registered: Registered
+    conditions: dict[str, Any]
+
+    def __reduce__(self) -> Any:
+        return _conditions_of, tuple(self)
+
+
+def _conditions_of(registered: None, conditions: dict[str, Any]) -> dict[str, Any]:
+    return conditions
 
 
 @functools.lru_cache(maxsize=256)
 def _packed(registered: Rule | LearnerType, code: tuple[tuple[str, str], ...]) -> bytes:
-    return _dumped(_registration(registered), [registered])
+    home = map(_home, _parts([registered]))
+    try:
+        return dumped(_registration(registered), _meaning(registered).modules, home)
+    except Exception as error:  # each type has reasons of its own
+        kind = "assistant" if isinstance(registered, Rule) else "learner"
+        raise cannot_be_sent(f"{kind} {registered.name!r}", error) from error
 
 
 def _registration(registered: Rule | LearnerType) -> _Registration:
@@ -135,22 +168,8 @@ def _register(is_rule: bool, name: str, given: _Registration) -> None:
             register_learner(name, given.settings_type, **functions, **given.others)
 
 
-def _dumped(things: Any, own: Iterable[Rule | LearnerType]) -> bytes:
-    """Things pickled with the modules that users' rules and learners come from and refer to.
-
-    So they run elsewhere as they do here, whatever is there under the names of these modules. A
-    module that cannot be pickled whole goes by its name, if no rule or learner comes from it.
-    """
-    import cloudpickle
-
-    from_there = {_home(part) for each in own for part in each.parts if part is not None}
-    all_of_them = {module for each in own for module in _meaning(each).modules}
-    try:
-        with _by_value(all_of_them):
-            return cloudpickle.dumps(things)
-    except (TypeError, AttributeError, pickle.PicklingError):
-        with _by_value(from_there & all_of_them):
-            return cloudpickle.dumps(things)
+def _parts(own: Iterable[Rule | LearnerType]) -> list[Any]:
+    return [part for each in own for part in each.parts if part is not None]
 
 
 def _meaning(registered: Rule | LearnerType) -> Meaning:
@@ -159,19 +178,3 @@ def _meaning(registered: Rule | LearnerType) -> Meaning:
 
 def _home(part: Any) -> str:
     return uncompiled(part).__module__
-
-
-@contextmanager
-def _by_value(names: Iterable[str]) -> Iterator[None]:
-    """Within the block, what comes from these modules is pickled whole, not by its name."""
-    import cloudpickle
-
-    before = cloudpickle.list_registry_pickle_by_value() | {"__main__"}
-    modules = [sys.modules[name] for name in set(names) & sys.modules.keys() - before]
-    for module in modules:
-        cloudpickle.register_pickle_by_value(module)
-    try:
-        yield
-    finally:
-        for module in modules:
-            cloudpickle.unregister_pickle_by_value(module)

@@ -13,12 +13,13 @@ from qbumpers.errors import RequestError, whole_number
 from qbumpers.simulation import deep, tabular
 from qbumpers.simulation.condition import Condition, Setup, make_condition
 from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
-from qbumpers.simulation.workers import make_pool, some_finished, submit
+from qbumpers.simulation.workers import make_pool, some_finished
 from qbumpers.tasks import Task
+from qbumpers.tasks.registry import Named
 
 
 def simulate(
-    task: Task,
+    task: Task | Named,
     assistant: Assistant | str,
     *,
     trials: int | range = 100,
@@ -33,12 +34,12 @@ def simulate(
     of workers and whichever trials are run together.
 
     Args:
-        task: what is to be learned.
+        task: what is to be learned: a task, or what `make_task` makes one of, for instance
+            "cliff-walking"; of a Gymnasium environment, give its `discount` too.
         assistant: an assistant, or the name of one that needs no options.
         trials: how many, at least 1; or which.
         seed: decides, with the condition and the number of a trial, all chance; not negative.
-        workers: threads, or processes if a task steps in Python; a script that asks for several of
-            those must guard its start with `if __name__ == "__main__"`.
+        workers: threads, or processes if a task steps in Python.
         **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
 
     Returns:
@@ -63,8 +64,8 @@ def run(
     ranges = [which[first:last] for first, last in itertools.pairwise(ends)]
     if len(ranges) == 1:
         return _run_block(condition, ranges[0], seed)
-    with make_pool(condition.task, workers) as pool:
-        blocks = [submit(pool, _run_block, condition, each, seed) for each in ranges]
+    with make_pool({"": condition}, workers) as pool:
+        blocks = [pool.submit(_run_block, "", each, seed) for each in ranges]
         waiting = set(blocks)
         while waiting:
             done, waiting = some_finished(waiting)

@@ -9,6 +9,6 @@ say something else than what runs.
 """
 
 from qbumpers.source.meaning import Meaning, meaning_of
-from qbumpers.source.origins import version_of
+from qbumpers.source.origins import home_of, version_of
 
-__all__ = ["Meaning", "meaning_of", "version_of"]
+__all__ = ["Meaning", "home_of", "meaning_of", "version_of"]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from qbumpers.errors import RequestError, in_short
+from qbumpers.errors import RequestError, counted, in_short
 
 _STEPS = (1_000, 6_000)  # at least and at most
 _STEPS_A_PAIR = 64  # of a state and an action, if there are not too many of them
@@ -131,8 +131,8 @@ class _Comparison:
         self._visits[pair] += 1
         if truncated and number + 1 < task.episode_limit:
             raise self._differs(
-                f"it truncated an episode after {number + 1} steps, and the step limit is "
-                f"{task.episode_limit}: if it always does so, give episode_limit={number + 1}"
+                f"it truncated an episode after {counted(number + 1, 'step')}, and the step limit "
+                f"is {task.episode_limit}: if it always does so, give episode_limit={number + 1}"
             )
         return next_state, terminated or bool(truncated)
 
@@ -187,8 +187,8 @@ class _Comparison:
                 outcome = int(np.abs(counts / self._tape - probability).argmax())
                 raise self._differs(
                     f"in state {pair[0]} action {pair[1]} led to "
-                    f"{_shown(*expected[outcome][:3])} {counts[outcome]} times of {self._tape}; "
-                    f"by the table its probability is {probability[outcome]:.3g}"
+                    f"{_shown(*expected[outcome][:3])} {counted(int(counts[outcome]), 'time')} of "
+                    f"{self._tape}; by the table its probability is {probability[outcome]:.3g}"
                 )
         most = math.sqrt(self._steps / 2 * math.log(3 * len(self._excess) / _CHANCE_OF_ERROR))
         place = int(self._excess.argmax())  # together they are 0

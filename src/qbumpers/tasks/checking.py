@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, counted
 from qbumpers.tasks.task import Task
 
 _EXACT, _NEAR = 1e-8, 1e-6  # how far from 1 sums of float64 and of float32 numbers come
@@ -106,7 +106,7 @@ def check_cells(task: Any) -> None:
     """Check what a table says of each state besides; RequestError names what is wrong."""
     place, states = f"task {task.name}", task.states
     if task.grid is not None and task.grid[0] * task.grid[1] != states:
-        raise RequestError(f"{place}: grid {task.grid} does not hold {states} states")
+        raise RequestError(f"{place}: grid {task.grid} does not hold {counted(states, 'state')}")
     if task.seen is None:
         return
     seen = np.asarray(task.seen)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 from qbumpers.tasks.display import made_by
@@ -58,6 +59,7 @@ def cliff_walking() -> TabularTask:
         episode_limit=EPISODE_LIMIT,
         grid=(ROWS, COLUMNS),
         make_display=made_by(cliff_walking_display),
+        environment_spec=gymnasium.spec("qbumpers/CliffWalking-v0"),
         **{field: array[:, :, None] for field, array in deterministic.items()},
     )
 

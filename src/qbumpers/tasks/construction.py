@@ -159,10 +159,14 @@ def description_of(environment: Any, episode_limit: int | None) -> Description:
     table = getattr(inner, "P", None)
     start = getattr(inner, "initial_state_distrib", None)
     if table is None or start is None:
-        missing = "P" if table is None else "initial_state_distrib"
+        lacks = (
+            "no attribute P: a tabular task needs its transition table; give one"
+            if table is None
+            else "a table of transitions P but no initial_state_distrib: set that attribute to the "
+            "probability of each first state, float [S], or give table and start"
+        )
         raise RequestError(
-            f"environment {name} has no attribute {missing}: a tabular task needs its "
-            "transition table; give one with TabularTask.from_table or TabularTask.from_arrays"
+            f"environment {name} has {lacks} with TabularTask.from_table or TabularTask.from_arrays"
         )
     reward = followed_reward(environment, name)
     first_state, first_action = _starts(environment, name, table)

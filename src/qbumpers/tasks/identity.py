@@ -45,8 +45,11 @@ def environment_digest(environment: Any) -> str:
         environment: with its spec; wrappers that only watch do not count, nor does drawing.
 
     Returns:
-        The digest, equal if an argument is given or left at the same default.
+        The digest, equal if an argument is given or left at the same default; empty if it has no
+        spec.
     """
+    if environment.spec is None:
+        return ""
     arguments = dict(environment.spec.kwargs)
     try:
         bound = inspect.signature(type(environment.unwrapped)).bind_partial(**arguments)

@@ -8,11 +8,13 @@ from typing import Any
 import gymnasium
 from gymnasium import spaces
 
-from qbumpers.errors import RequestError, unknown_name
+from qbumpers.errors import RequestError, in_short, suggestion, unknown_name
+from qbumpers.imports import import_modules, module_and_name
+from qbumpers.registration import is_written_here
 from qbumpers.tasks.cliff_walking import cliff_walking
-from qbumpers.tasks.stepping import make_environment
+from qbumpers.tasks.stepping import environment_name, make_environment, maker_name
 from qbumpers.tasks.tabular import TabularTask
-from qbumpers.tasks.task import Task
+from qbumpers.tasks.task import Task, check_task
 from qbumpers.tasks.vector import VectorTask
 
 
@@ -21,6 +23,17 @@ def _lunar_lander(seed: int | None = None) -> VectorTask:
 
     return lunar_lander(seed)
 
+
+_MODULE_MISSING = (
+    "; if a package or module of yours registers it, have that imported: imports = ['MODULE'] in "
+    "an experiment file, --import MODULE, or 'MODULE:NAME' as its name"
+)
+
+Maker = Callable[..., gymnasium.Env[Any, Any]]
+"""A function or class that makes an environment."""
+
+Named = str | gymnasium.Env[Any, Any] | Maker
+"""What stands for a task: a name, an environment, or what makes one."""
 
 _tasks: dict[str, Callable[..., Task]] = {
     "cliff-walking": cliff_walking,
@@ -38,22 +51,35 @@ def register_task(name: str, make: Callable[..., Task]) -> None:
     _tasks[name] = make
 
 
+def own_tasks() -> dict[str, Callable[..., Task]]:
+    """What makes each task that was registered from outside this package, by name."""
+    return {name: make for name, make in _tasks.items() if not is_written_here(make)}
+
+
 def task_names() -> list[str]:
     """Names of the registered tasks."""
     return list(_tasks)
 
 
 def make_task(
-    name: str, *, discount: float | None = None, episode_limit: int | None = None, **arguments: Any
+    name: Named,
+    *,
+    discount: float | None = None,
+    episode_limit: int | None = None,
+    max_episode_steps: int | None = None,
+    **arguments: Any,
 ) -> Task:
-    """A task by name.
+    """A task by name, or of a Gymnasium environment.
 
     Args:
         name: a registered name such as "cliff-walking", or the id of a Gymnasium environment with
             a transition table such as "FrozenLake-v1", or with numbered actions and a vector
-            observation such as "CartPole-v1".
+            observation such as "CartPole-v1"; after the module that registers it, if need be, as
+            in "minigrid:MiniGrid-Empty-5x5-v0". Or such an environment itself, if Gymnasium can
+            make it again, or a function or class that makes one.
         discount: of a Gymnasium environment, which states none; in (0, 1].
         episode_limit: of a Gymnasium environment, in steps; its own if None.
+        max_episode_steps: what Gymnasium calls `episode_limit`; either may be given.
         **arguments: of the task, for example `seed=0` of "lunar-lander", or of the Gymnasium
             environment, for example `is_slippery=True`.
 
@@ -61,28 +87,101 @@ def make_task(
         The task, a TabularTask if there is a transition table.
 
     Raises:
-        RequestError: if no task or environment has the name, or an argument does not suit it.
+        RequestError: if no task or environment has the name, the module cannot be imported, the
+            environment cannot be made again, or an argument does not suit it.
     """
-    if str(name) in _tasks:
-        numbers = {"discount": discount, "episode_limit": episode_limit}
+    limit = _one_limit(episode_limit, max_episode_steps)
+    if isinstance(name, gymnasium.Env):
+        return _of_environment(name, discount, limit, arguments)
+    if callable(name):
+        return _of_maker(name, discount, limit, arguments)
+    name = _name_after_import(name)
+    if name in _tasks:
+        numbers = {"discount": discount, "episode_limit": limit}
         given = {field: value for field, value in numbers.items() if value is not None}
         return _registered(name, {**given, **arguments})
-    if str(name) not in gymnasium.registry:
+    if name not in gymnasium.registry:
         known = [*_tasks, *tabular_environments(), *vector_environments()]
-        raise unknown_name("task", name, known)
-    if discount is None:
+        raise unknown_name("task", in_short(name)[1:-1], known, _MODULE_MISSING)
+    return _of_maker(name, discount, limit, arguments)
+
+
+def as_task(task: Task | Named, discount: float | None = None) -> Task:
+    """A task from whatever is given in its place.
+
+    Args:
+        task: a task, which stays what it is, or what `make_task` takes.
+        discount: for `make_task`.
+
+    Raises:
+        RequestError: as `make_task`; if it is nothing of the kind; or if there is a discount and
+            the task states its own.
+    """
+    if isinstance(task, str | gymnasium.Env) or callable(task):
+        return make_task(task, discount=discount)
+    check_task(task)
+    if discount is not None and discount != task.discount:
         raise RequestError(
-            f"task {name!r}: discount is missing; Gymnasium states none, give one in (0, 1]"
+            f"discount = {discount!r}; task {task.name} states its own, {task.discount:g}"
         )
-    with closing(make_environment(name, **arguments)) as environment:
+    return task
+
+
+def _one_limit(episode_limit: int | None, max_episode_steps: int | None) -> int | None:
+    if episode_limit is None or max_episode_steps in (None, episode_limit):
+        return max_episode_steps if episode_limit is None else episode_limit
+    raise RequestError(
+        f"max_episode_steps = {max_episode_steps!r}; episode_limit = {episode_limit!r} means the "
+        "same: give one"
+    )
+
+
+def _name_after_import(task: Any) -> str:
+    """The name of a task, once the module before a colon is imported."""
+    module, name = module_and_name(str(task))
+    if str(task) in _tasks or not module:
+        return str(task)
+    import_modules([module], f"task {task!r}")
+    return name
+
+
+def _of_maker(
+    maker: str | Maker, discount: float | None, limit: int | None, arguments: dict[str, Any]
+) -> Task:
+    """A task of an environment that its id or a function makes."""
+    name = repr(maker) if isinstance(maker, str) else maker_name(maker)
+    discount = _needed(discount, name, arguments)
+    with closing(make_environment(maker, **arguments)) as environment:
         # A wrapper may show a numbered state as a vector.
         if isinstance(environment.observation_space, spaces.Discrete):
-            return TabularTask.from_gymnasium(
-                environment, discount=discount, episode_limit=episode_limit
-            )
-    return VectorTask.from_gymnasium(
-        name, discount=discount, episode_limit=episode_limit, **arguments
-    )
+            return TabularTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
+    return VectorTask.from_gymnasium(maker, discount=discount, episode_limit=limit, **arguments)
+
+
+def _of_environment(
+    environment: Any, discount: float | None, limit: int | None, arguments: dict[str, Any]
+) -> Task:
+    """A task of an environment that is made already."""
+    name = environment_name(environment)
+    discount = _needed(discount, name, arguments)
+    if arguments:
+        raise RequestError(
+            f"task {name}: {', '.join(arguments)} cannot be given; the environment is made already"
+        )
+    if isinstance(environment.observation_space, spaces.Discrete):
+        return TabularTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
+    return VectorTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
+
+
+def _needed(discount: float | None, name: str, arguments: Mapping[str, Any]) -> float:
+    if discount is None:
+        for argument in arguments:
+            if suggestion(argument, ("discount",)):
+                raise unknown_name(f"argument of task {name}", argument, ("discount",))
+        raise RequestError(
+            f"task {name}: discount is missing; Gymnasium states none, give one in (0, 1]"
+        )
+    return discount
 
 
 def _registered(name: str, given: Mapping[str, Any]) -> Task:

@@ -1,14 +1,17 @@
 """Environments as simulators step through them, one action at a time."""
 
+import dataclasses
+import functools
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec, load_env_creator
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 from qbumpers.source import version_of
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.undoing import undo_of
@@ -17,6 +20,7 @@ from qbumpers.tasks.wrapping import layers
 REVISION = 1
 """Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
 
+_NOTHING = object()
 _SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
 
 
@@ -69,12 +73,13 @@ class GymnasiumStepper:
     `snapshot` and `restore` are those of the environment, and refused if it has none.
 
     Args:
-        name: id of the environment.
+        maker: id of the environment, or what makes it; the step limit of what it makes holds too.
         arguments: what the environment takes besides, by name.
     """
 
-    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
-        self._environment = make_environment(name, max_episode_steps=-1, **arguments)
+    def __init__(self, maker: str | Callable[..., Any], arguments: Mapping[str, Any]) -> None:
+        unlimited = {"max_episode_steps": -1} if isinstance(maker, str) else {}
+        self._environment = make_environment(maker, **unlimited, **arguments)
         self._first_action = int(self._environment.action_space.start)
 
     def reset(self, chance: float) -> np.ndarray:
@@ -120,12 +125,12 @@ def stepped_by_of(environment: Any) -> tuple[Any, ...]:
     return (*kinds, *makes, *given, *dict.fromkeys(libraries))
 
 
-def make_environment(name: str, **arguments: Any) -> Any:
+def make_environment(maker: str | Callable[..., Any], **arguments: Any) -> Any:
     """A Gymnasium environment.
 
     Args:
-        name: id of the environment, for example "CartPole-v1".
-        **arguments: what `gymnasium.make` takes besides.
+        maker: id of the environment, for example "CartPole-v1", or what makes it.
+        **arguments: what `gymnasium.make` or the maker takes besides.
 
     Returns:
         The environment.
@@ -133,8 +138,99 @@ def make_environment(name: str, **arguments: Any) -> Any:
     Raises:
         RequestError: if there is none of this name or an argument does not suit it.
     """
+    if not isinstance(maker, str):
+        return _made_by(maker, arguments)
     try:
-        return gymnasium.make(name, disable_env_checker=True, **arguments)
+        return gymnasium.make(maker, disable_env_checker=True, **arguments)
     except (TypeError, ValueError, LookupError, gymnasium.error.Error, ImportError) as error:
         missing = "; pip install 'qbumpers[lunar]'" if "Box2D" in str(error) else ""
-        raise RequestError(f"task {name!r}: {error}{missing}") from error
+        raise RequestError(f"task {maker!r}: {error}{missing}") from error
+
+
+def _made_by(maker: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
+    try:
+        made = maker(**arguments)
+    except Exception as error:  # whatever goes wrong in it
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise RequestError(f"task {maker_name(maker)}: no environment is made: {reason}") from error
+    if not isinstance(made, gymnasium.Env):
+        raise RequestError(
+            f"task {maker_name(maker)}: it makes {in_short(made)}; a Gymnasium environment is "
+            "needed"
+        )
+    return made
+
+
+def maker_name(maker: Callable[..., Any]) -> str:
+    """What makes an environment, for messages and files."""
+    return str(getattr(maker, "__qualname__", type(maker).__name__))
+
+
+def environment_name(environment: Any) -> str:
+    """The id of a Gymnasium environment, or the name of its class."""
+    spec = environment.spec
+    return str(spec.id) if spec else type(environment.unwrapped).__name__
+
+
+def remade_by(environment: Any, limit: int | None) -> EnvSpec | None:
+    """How Gymnasium can make an environment again in any process, written as text.
+
+    Args:
+        environment: with its wrappers.
+        limit: its steps.
+
+    Returns:
+        The specification; None if it names what cannot be written, or comes from no module.
+    """
+    if environment.spec is None:
+        return None
+    kwargs = {k: v for k, v in environment.spec.kwargs.items() if k != "render_mode"}
+    made = environment.spec.entry_point
+    named = made if isinstance(made, str) else f"{made.__module__}:{maker_name(made)}"
+    spec = dataclasses.replace(
+        environment.spec, kwargs=kwargs, max_episode_steps=limit, entry_point=named
+    )
+    wrappers = spec.additional_wrappers
+    try:
+        load_env_creator(named)
+        spec.to_json()
+    except (ImportError, AttributeError, TypeError, ValueError):
+        return None
+    from_modules = (named, *(wrapper.entry_point for wrapper in wrappers))
+    if any(name.startswith("__main__:") for name in from_modules):
+        return None
+    return None if any(wrapper.kwargs is None for wrapper in wrappers) else spec
+
+
+def maker_of(environment: Any) -> tuple[str | Callable[..., Any], dict[str, Any]]:
+    """How a Gymnasium environment can be made again, with its wrappers.
+
+    Args:
+        environment: of `gymnasium.make`.
+
+    Returns:
+        Its id with the arguments that differ from those it is registered with, if wrappers are none
+        but those of its registration; else a function that makes it.
+
+    Raises:
+        RequestError: if Gymnasium does not know how.
+    """
+    spec, name = environment.spec, environment_name(environment)
+    if spec is None:
+        raise RequestError(
+            f"environment {name} is not of gymnasium.make, so that processes cannot make it again: "
+            "give what makes it, its class or a function, in its place"
+        )
+    registered = gymnasium.registry.get(spec.id)
+    for wrapper in spec.additional_wrappers:
+        if wrapper.kwargs is None or wrapper.entry_point.startswith("__main__:"):
+            raise RequestError(
+                f"environment {name}: Gymnasium cannot make wrapper {wrapper.name} again; give a "
+                "function that makes the environment with it in its place"
+            )
+    arguments = {k: v for k, v in spec.kwargs.items() if k != "render_mode"}
+    if registered is None or registered.additional_wrappers != spec.additional_wrappers:
+        unlimited = dataclasses.replace(spec, kwargs=arguments)
+        return functools.partial(gymnasium.make, unlimited, max_episode_steps=-1), {}
+    own = {k: v for k, v in arguments.items() if registered.kwargs.get(k, _NOTHING) is not v}
+    return spec.id, own

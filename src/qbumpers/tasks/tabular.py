@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.wrappers import TimeLimit
 from numpy.typing import ArrayLike
 
@@ -28,7 +29,7 @@ from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
 from qbumpers.tasks.identity import transitions_digest
-from qbumpers.tasks.stepping import Stepper
+from qbumpers.tasks.stepping import Stepper, remade_by
 from qbumpers.tasks.task import distance_between
 
 
@@ -58,6 +59,8 @@ class TabularTask:
         first_state: number that its environment gives to state 0; it counts on from there.
         first_action: number that its environment gives to action 0.
         make_display: makes `display` of the task; no part of its digest.
+        environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
+            digest.
 
     Raises:
         RequestError: if shapes disagree, a probability row does not sum to 1, a state or action
@@ -81,6 +84,7 @@ class TabularTask:
     first_state: int = 0
     first_action: int = 0
     make_display: Callable[["TabularTask"], Any] | None = None
+    environment_spec: EnvSpec | None = None
 
     observation_size = 0
     undoable = True
@@ -89,6 +93,10 @@ class TabularTask:
     value_sources = ("exact", "q-learning")
     code = ()
     revision = 1
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without `environment_spec`, which may name what workers need not have."""
+        return {**self.__dict__, "environment_spec": None}
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -325,6 +333,7 @@ class TabularTask:
         numbered = replace(
             made, first_state=found.first_state, first_action=found.first_action,
             make_display=display_maker(environment),
+            environment_spec=remade_by(environment, made.episode_limit),
         )  # fmt: skip
         check_agreement(numbered, environment.unwrapped, found.reward)
         return numbered

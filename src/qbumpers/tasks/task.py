@@ -4,20 +4,23 @@ from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 from qbumpers.tasks.dynamics import Dynamics
 from qbumpers.tasks.stepping import Stepper
 
 
 def check_task(task: Any) -> None:
-    """Check that a task is not merely named.
+    """Check that a task is none in name only.
 
     Raises:
         RequestError: if it is.
     """
-    if task is None or isinstance(task, str):
-        raise RequestError(f"task = {task!r}; a task is needed, for instance of make_task(name)")
+    if not callable(getattr(task, "digest", None)):
+        raise RequestError(
+            f"task = {in_short(task)}; a task is needed, for instance of make_task(name)"
+        )
 
 
 class Task(Protocol):
@@ -124,6 +127,11 @@ class Task(Protocol):
     @property
     def releases_gil(self) -> bool:
         """Whether simulations of it run in threads at once: none of it is Python."""
+        ...
+
+    @property
+    def environment_spec(self) -> EnvSpec | None:
+        """How Gymnasium makes the environment that it is; None if Gymnasium does not know it."""
         ...
 
     @property

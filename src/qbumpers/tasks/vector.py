@@ -9,6 +9,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.wrappers import TimeLimit
 
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
@@ -20,7 +22,11 @@ from qbumpers.tasks.stepping import (
     REVISION,
     GymnasiumStepper,
     Stepper,
+    environment_name,
     make_environment,
+    maker_name,
+    maker_of,
+    remade_by,
     stepped_by_of,
 )
 from qbumpers.tasks.task import distance_between
@@ -57,6 +63,8 @@ class VectorTask:
         first_action: number that the environment gives to action 0.
         origin: digest of the Gymnasium environment that it was made from; empty if there is none.
         make_display: makes `display` of the task; no part of its digest.
+        environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
+            digest.
         stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
             classes and functions; and modules, for the versions of their libraries.
         revision: raised when it gives other numbers for a reason that its code does not show.
@@ -83,6 +91,7 @@ class VectorTask:
     first_action: int = 0
     origin: str = ""
     make_display: Callable[["VectorTask"], Any] | None = None
+    environment_spec: EnvSpec | None = None
     stepped_by: tuple[Any, ...] = ()
     revision: int = 1
 
@@ -110,8 +119,8 @@ class VectorTask:
             ) from error
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without `stepped_by`, which workers need not have: modules cannot be pickled."""
-        return {**self.__dict__, "stepped_by": ()}
+        """Without what workers need not have: modules cannot be pickled."""
+        return {**self.__dict__, "stepped_by": (), "environment_spec": None}
 
     @property
     def start(self) -> np.ndarray:
@@ -185,7 +194,12 @@ class VectorTask:
 
     @classmethod
     def from_gymnasium(
-        cls, name: str, *, discount: float, episode_limit: int | None = None, **arguments: Any
+        cls,
+        environment: Any,
+        *,
+        discount: float,
+        episode_limit: int | None = None,
+        **arguments: Any,
     ) -> "VectorTask":
         """A task from a Gymnasium environment with numbered actions and a vector observation.
 
@@ -195,7 +209,8 @@ class VectorTask:
         undone if `undo_of` says so of the environment.
 
         Args:
-            name: id of the environment, for example "CartPole-v1".
+            environment: its id, for example "CartPole-v1"; a function or class that makes
+                it; or an environment of `gymnasium.make`, which is made again with its wrappers.
             discount: in (0, 1]; Gymnasium's environments state none.
             episode_limit: steps; the environment's own limit if None.
             **arguments: of the environment, JSON-like.
@@ -208,34 +223,64 @@ class VectorTask:
                 not Discrete or its observations not a vector, no limit is known, or an episode
                 depends on those before it.
         """
-        with closing(make_environment(name, **arguments)) as environment:
+        maker: Any = environment
+        if isinstance(environment, gymnasium.Env):
+            episode_limit = step_limit(environment) if episode_limit is None else episode_limit
+            maker, arguments = maker_of(environment)
+        with closing(make_environment(maker, **arguments)) as environment:
+            name = maker if isinstance(maker, str) else environment_name(environment)
             _check_spaces(name, environment)
             _check_repeatable(name, environment)
             announced, undoable = _announced(environment), can_undo(environment)
             stepped_by = stepped_by_of(environment)
             limit = step_limit(environment) if episode_limit is None else episode_limit
+            spec = remade_by(environment, limit)
         if limit is None:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         return cls(
             name=name,
-            make_stepper=functools.partial(GymnasiumStepper, name, arguments),
-            make_environment=functools.partial(
-                gymnasium.make, name, max_episode_steps=limit, **arguments
-            ),
+            make_stepper=functools.partial(GymnasiumStepper, maker, arguments),
+            make_environment=_maker_for_participants(maker, limit, arguments),
             observation_size=environment.observation_space.shape[0],
             actions=int(environment.action_space.n),
             discount=discount,
             episode_limit=limit,
-            settings={"environment": name, "arguments": arguments},
+            settings={"environment": name, "arguments": arguments, **_made_by(maker, environment)},
             has_success="success" in announced,
             has_crash="crash" in announced,
             undoable=undoable,
             first_action=int(environment.action_space.start),
             origin=environment_digest(environment),
             make_display=display_maker(environment),
+            environment_spec=spec,
             stepped_by=stepped_by,
             revision=REVISION,
         )
+
+
+def _maker_for_participants(
+    maker: Any, limit: int, arguments: Mapping[str, Any]
+) -> Callable[..., gymnasium.Env[Any, Any]]:
+    if isinstance(maker, str):
+        return functools.partial(gymnasium.make, maker, max_episode_steps=limit, **arguments)
+    return functools.partial(_limited, maker, limit, arguments)
+
+
+def _limited(
+    maker: Any, limit: int, arguments: Mapping[str, Any], *, render_mode: str | None = None
+) -> gymnasium.Env[Any, Any]:
+    """What a function makes, with a step limit if it has another or none."""
+    drawn = {} if render_mode is None else {"render_mode": render_mode}
+    environment = make_environment(maker, **arguments, **drawn)
+    return environment if step_limit(environment) == limit else TimeLimit(environment, limit)
+
+
+def _made_by(maker: Any, environment: Any) -> dict[str, Any]:
+    """What tells an environment that a function makes from the one of its id."""
+    if isinstance(maker, str):
+        return {}
+    around = [type(layer).__name__ for layer in altering_wrappers(environment)]
+    return {"made by": maker_name(maker), "wrappers": around}
 
 
 def _plain_facts(no_op: int, distance: np.ndarray | None) -> list[Any]:

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import gymnasium
 
-from qbumpers.errors import RequestError, in_short
+from qbumpers.errors import RequestError, counted, in_short
 from qbumpers.tasks.construction import description_of
 from qbumpers.tasks.identity import (
     environment_digest,
@@ -27,6 +27,7 @@ class Use(NamedTuple):
         inputs: numbers of an observation that is a vector; 0 if it is none.
         actions: A.
         identity: as tasks have it; empty if it is not known.
+        discount: of values that state none, in (0, 1]; None if it is not known.
     """
 
     name: str
@@ -34,13 +35,15 @@ class Use(NamedTuple):
     inputs: int
     actions: int
     identity: str = ""
+    discount: float | None = None
 
     def needs(self) -> str:
         """What kind of values, in words."""
         if self.rows:
             return f"a table [{self.rows}, {self.actions}]"
         if self.inputs:
-            return f"a network of {self.inputs} inputs and {self.actions} actions"
+            inputs, actions = counted(self.inputs, "input"), counted(self.actions, "action")
+            return f"a network of {inputs} and {actions}"
         return "a function of observations that are neither numbers of states nor vectors"
 
 
@@ -48,7 +51,9 @@ def use_at(task: Task) -> Use:
     """What values of a task are put to."""
     rows = task.states if task.seen is None else int(max(task.seen)) + 1
     name = f"task {task.name}"
-    return Use(name, rows, task.observation_size, task.actions, task.identity())
+    return Use(
+        name, rows, task.observation_size, task.actions, task.identity(), float(task.discount)
+    )
 
 
 def use_in(environment: Any, name: str, states: int, inputs: int, stated: Any) -> Use:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import qbumpers
-from qbumpers.errors import RequestError, checked
+from qbumpers.errors import RequestError, checked, counted
 from qbumpers.files import write_atomically
 from qbumpers.networks.network import Layout, Network, forward, named_parameters
 from qbumpers.values.fitting import Use, check_made_for
@@ -107,8 +107,8 @@ class NetworkValues:
         """
         if use.rows or (self.inputs, self.actions) != (use.inputs, use.actions):
             raise RequestError(
-                f"values of {self.task}: a network of {self.inputs} inputs and {self.actions} "
-                f"actions; {use.name} needs {use.needs()}"
+                f"values of {self.task}: a network of {counted(self.inputs, 'input')} and "
+                f"{counted(self.actions, 'action')}; {use.name} needs {use.needs()}"
             )
         check_made_for(self, use)
 

@@ -15,9 +15,9 @@ from zipfile import BadZipFile
 import numpy as np
 
 import qbumpers
-from qbumpers.errors import RequestError, in_short
+from qbumpers.errors import RequestError, counted, in_short
 from qbumpers.files import write_atomically
-from qbumpers.values.fitting import Use, check_made_for
+from qbumpers.values.fitting import Use, check_fit, check_made_for
 from qbumpers.values.network import NetworkValues, network_values
 from qbumpers.values.others import (
     arrays_of_others,
@@ -120,7 +120,7 @@ class TabularValues:
         if not 0 <= state < len(self.table):  # -1 would be taken for the last state
             raise RequestError(
                 f"values of {self.task}: {in_short(observation)} is not the number of a state; "
-                f"their table has {len(self.table)} states, from 0 on"
+                f"their table has {counted(len(self.table), 'state')}, from 0 on"
             )
         return self.table[state]
 
@@ -278,6 +278,26 @@ def _numbers(given: Any, what: str) -> np.ndarray:
         return np.array(given, np.float64)
     except (TypeError, ValueError) as error:
         raise RequestError(f"{what} = {in_short(given)}; an array of numbers is needed") from error
+
+
+def as_values(values: Any, use: Use) -> QValues:
+    """Values of whatever may be given as such, compared with what they are put to.
+
+    Args:
+        values: a float array [S, A], or what is called for the values of a state.
+        use: what they are put to.
+
+    Returns:
+        The values; of an array, a table with the discount of the use, if that is known.
+
+    Raises:
+        RequestError: as `check_fit`.
+    """
+    if isinstance(values, np.ndarray) and use.discount is not None:
+        table = cast(np.ndarray, values)
+        return as_values(TabularValues(table, use.discount, use.name, "given as an array"), use)
+    check_fit(values, use)
+    return cast(QValues, values)
 
 
 def check_width(values: Any, actions: int, where: str) -> np.ndarray:

@@ -4,6 +4,7 @@ Box2D moves the bodies; what Gymnasium computes around it in Python is compiled 
 drawn ahead, once, since every episode has the same.
 """
 
+import dataclasses
 import functools
 import math
 from typing import Any
@@ -196,6 +197,9 @@ def lunar_lander(seed: int | None = None) -> VectorTask:
         name="lunar-lander",
         make_stepper=functools.partial(Lander, seed),
         make_environment=functools.partial(gymnasium.make, "qbumpers/LunarLander-v0", seed=seed),
+        environment_spec=dataclasses.replace(
+            gymnasium.spec("qbumpers/LunarLander-v0"), kwargs={"seed": seed}
+        ),
         observation_size=OBSERVATION_SIZE,
         actions=ACTIONS,
         discount=DISCOUNT,

@@ -1,0 +1,46 @@
+"""Pickling what comes from modules of a user's own whole, and not by its name."""
+
+import pickle
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+
+def dumped(things: Any, modules: Iterable[str], alone: Iterable[str] = ()) -> bytes:
+    """Things pickled with the modules that they come from and refer to.
+
+    So they run elsewhere as they do here, whatever is there under the names of these modules. What
+    comes from the script or notebook that was started is always pickled whole.
+
+    Args:
+        things: any.
+        modules: names of those modules.
+        alone: which of them must be pickled whole even if others cannot be: those go by their
+            names then.
+    """
+    import cloudpickle
+
+    whole = set(modules)
+    try:
+        with _by_value(whole):
+            return cloudpickle.dumps(things)
+    except (TypeError, AttributeError, pickle.PicklingError):
+        with _by_value(set(alone) & whole):
+            return cloudpickle.dumps(things)
+
+
+@contextmanager
+def _by_value(names: Iterable[str]) -> Iterator[None]:
+    """Within the block, what comes from these modules is pickled whole, not by its name."""
+    import cloudpickle
+
+    before = cloudpickle.list_registry_pickle_by_value() | {"__main__"}
+    modules = [sys.modules[name] for name in set(names) & sys.modules.keys() - before]
+    for module in modules:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        yield
+    finally:
+        for module in modules:
+            cloudpickle.unregister_pickle_by_value(module)
