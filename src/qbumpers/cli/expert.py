@@ -51,6 +51,20 @@ Corrected = Annotated[
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
+Observe = Annotated[
+    str | None,
+    typer.Option(
+        help="Keys of a Dict observation that are kept; all if left out.", metavar="KEY,KEY,..."
+    ),
+]
+Estimated = Annotated[
+    int | None,
+    typer.Option(
+        help="Estimate a table from so many steps, if states are numbered.",
+        metavar="N",
+        min=1,
+    ),
+]
 Seeds = Annotated[
     int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
 ]
@@ -81,6 +95,8 @@ def expert(
     out: Out = None,
     corrected: Corrected = None,
     discount: Discount = None,
+    observe: Observe = None,
+    estimated: Estimated = None,
     seeds: Seeds = 10,
     steps: Steps = 400_000,
     activation: Activation = "tanh",
@@ -90,10 +106,10 @@ def expert(
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 
-    A task with a transition table is solved exactly. Any other is learned by Double DQN, by the
-    paper's recipe as it stands, with several seeds. The best is kept: the one with the most
-    successes in 100 episodes with 2% random actions; among equals, with 10% random actions; among
-    equals, after 50 random actions at the beginning. If the task has no success, mean
+    A task with a transition table is solved exactly, an estimated one too. Any other is learned
+    by Double DQN, by the paper's recipe as it stands, with several seeds. The best is kept: the
+    one with the most successes in 100 episodes with 2% random actions; among equals, with 10%
+    random actions; among equals, after 50 random actions at the beginning. If the task has no success, mean
     returns decide instead. Training that was stopped goes on with the seeds that are missing.
 
     A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
@@ -105,7 +121,8 @@ def expert(
     from qbumpers.experts.selecting import make_recipe
     from qbumpers.tasks import make_task
 
-    made = make_task(task, discount=discount)
+    keys = None if observe is None else [key for key in observe.split(",") if key]
+    made = make_task(task, discount=discount, observe=keys, estimated=estimated)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     _check_conversion(made, check, convert, statistics)
@@ -316,7 +333,7 @@ def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
 def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path: Path) -> None:
     from qbumpers.experts.loading import load_table
     from qbumpers.experts.tables import check_exactness
-    from qbumpers.values import solve
+    from qbumpers.values import solve, start_interval
 
     if figures is not None:
         raise RequestError(f"--figures {figures}: a table needs none, it is compared exactly")
@@ -329,6 +346,13 @@ def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path
         f"mean {found.mean_error:.2g}",
         soft_wrap=True,
     )
+    if task.estimate is not None:
+        start = start_interval(task)
+        OUTPUT.print(
+            f"The table was {task.estimate.words()}. V* of the start: {start.value:.3g}, 95% "
+            f"interval {start.low:.3g} to {start.high:.3g}",
+            soft_wrap=True,
+        )
     if check is None:
         values.save(path)
         OUTPUT.print(f"Values: [bold]{escape(str(path))}[/bold]", soft_wrap=True)

@@ -1,7 +1,7 @@
 """Environments as simulators step through them, one action at a time."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -14,7 +14,7 @@ from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.undoing import undo_of
 from qbumpers.tasks.wrapping import layers
 
-REVISION = 1
+REVISION = 2
 """Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
 
 _SEEDS = 2**32  # as many as Gymnasium's environments are sure to take
@@ -69,12 +69,12 @@ class GymnasiumStepper:
     `snapshot` and `restore` are those of the environment, and refused if it has none.
 
     Args:
-        name: id of the environment.
-        arguments: what the environment takes besides, by name.
+        make: makes the environment, without a step limit; its `info` has `success` and `crash` if
+            it tells them.
     """
 
-    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
-        self._environment = make_environment(name, max_episode_steps=-1, **arguments)
+    def __init__(self, make: Callable[[], Any]) -> None:
+        self._environment = make()
         self._first_action = int(self._environment.action_space.start)
 
     def reset(self, chance: float) -> np.ndarray:

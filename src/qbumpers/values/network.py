@@ -108,7 +108,7 @@ class NetworkValues:
         if use.rows or (self.inputs, self.actions) != (use.inputs, use.actions):
             raise RequestError(
                 f"values of {self.task}: a network of {self.inputs} inputs and {self.actions} "
-                f"actions; {use.name} needs {use.needs()}"
+                f"actions; {use.name} needs {use.needs()}{use.advice}"
             )
         check_made_for(self, use)
 
