@@ -68,17 +68,34 @@ Estimated = Annotated[
 Seeds = Annotated[
     int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
 ]
-Steps = Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)]
-Activation = Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")]
-Hidden = Annotated[str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")]
-LearningRate = Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")]
+Steps = Annotated[
+    int | None,
+    typer.Option(
+        help="Of training each.", metavar="N", min=1,
+        show_default="200,000; 400,000 of the lunar lander",
+    ),
+]  # fmt: skip
+Activation = Annotated[
+    str | None, typer.Option(help="Of hidden units.", metavar="tanh|relu", show_default="tanh")
+]
+Hidden = Annotated[
+    str | None,
+    typer.Option(help="Units of each hidden layer.", metavar="N,N,...", show_default="64,64"),
+]
+LearningRate = Annotated[
+    float | None,
+    typer.Option(
+        help="Of Adam.", metavar="NUMBER", show_default="0.00025; 0.0005 of the lunar lander"
+    ),
+]
 RandomStart = Annotated[
-    int,
+    int | None,
     typer.Option(
         "--random-start",
         "--opening",
         help="Random actions before each episode of training.",
         metavar="N",
+        show_default="0; 50 of the lunar lander",
     ),
 ]
 
@@ -98,19 +115,21 @@ def expert(
     observe: Observe = None,
     estimated: Estimated = None,
     seeds: Seeds = 10,
-    steps: Steps = 400_000,
-    activation: Activation = "tanh",
-    hidden: Hidden = "64,64",
-    learning_rate: LearningRate = 5e-4,
-    random_start: RandomStart = 50,
+    steps: Steps = None,
+    activation: Activation = None,
+    hidden: Hidden = None,
+    learning_rate: LearningRate = None,
+    random_start: RandomStart = None,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 
     A task with a transition table is solved exactly, an estimated one too. Any other is learned
-    by Double DQN, by the paper's recipe as it stands, with several seeds. The best is kept: the
+    by Double DQN with several seeds: the lunar lander by the paper's recipe as it stands, others
+    by a general one, and what Gymnasium counts as solved is checked. The best is kept: the
     one with the most successes in 100 episodes with 2% random actions; among equals, with 10%
-    random actions; among equals, after 50 random actions at the beginning. If the task has no success, mean
-    returns decide instead. Training that was stopped goes on with the seeds that are missing.
+    random actions; among equals, after 50 random actions at the beginning. If the task has no
+    success, mean returns decide instead. Training that was stopped goes on with the seeds that
+    are missing.
 
     A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
     observations, give the statistics too: its own file does not hold them. Such files can hold
@@ -146,7 +165,7 @@ def expert(
             recipe = make_recipe(
                 made,
                 steps=steps,
-                hidden=_hidden(hidden),
+                hidden=None if hidden is None else _hidden(hidden),
                 activation=activation,
                 learning_rate=learning_rate,
                 random_start=random_start,
@@ -207,6 +226,7 @@ def _hidden(text: str) -> list[int]:
 
 def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
+    from qbumpers.experts.checking import check_threshold
     from qbumpers.experts.selecting import train_best
 
     with _steps_bar() as bar:
@@ -220,6 +240,13 @@ def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None
     OUTPUT.print(_judgements(task, seeds, found.judgements))
     with expert_warnings_printed():
         check_expert(task, found.values)
+        solved = check_threshold(task, found.values)
+    if solved is not None and solved.reached:
+        OUTPUT.print(
+            f"Greedy episodes return {solved.returned.mean:.1f}; the environment counts as solved "
+            f"from {solved.threshold:g} on.",
+            soft_wrap=True,
+        )
     OUTPUT.print(
         f"Kept seed {seeds[found.best]} in [bold]{escape(str(path))}[/bold]; all of them are in "
         f"{escape(str(found.folder))}",
