@@ -15,7 +15,8 @@ from qbumpers.decisions import Model, Noise, Step
 from qbumpers.errors import RequestError, action_number, check_number, suggestion, unknown_name
 from qbumpers.learners import Perception
 from qbumpers.session import Session
-from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
+from qbumpers.tasks.announcing import events_told
+from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from qbumpers.tasks.identity import task_inside
 from qbumpers.tasks.undoing import reached_limit, undo_of
 from qbumpers.values import QValues, TabularValues, load_values
@@ -213,7 +214,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         events = TERMINATED * bool(terminated)
         if truncated:
             events |= LIMIT if reached_limit(self.env) else TRUNCATED
-        return events | SUCCESS * bool(info.get("success")) | CRASH * bool(info.get("crash"))
+        return events | events_told(info)
 
     def _take_back(self, before: Any) -> None:
         if self._undo is None:

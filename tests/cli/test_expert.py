@@ -1,5 +1,7 @@
 """`qbumpers expert`: solve, train, check."""
 
+import re
+
 import numpy as np
 import pytest
 from stable_baselines3 import DQN
@@ -10,7 +12,7 @@ from qbumpers import load_values, solve
 from qbumpers.experts import correcting, visiting
 from qbumpers.tasks import make_task
 from qbumpers.values import NetworkValues, TabularValues
-from tests.narrowing import of_kind
+from tests.narrowing import of_kind, present
 from tests.values.networks import constant, network_of
 
 POLE = ("CartPole-v1", "--discount", "0.9")
@@ -62,6 +64,25 @@ def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
     assert values.digest() in digests
     assert call("expert", *QUICK, "--out", "expert.npz")[0] == 0
     assert [path.stat().st_mtime_ns for path in kept] == before
+
+
+def test_an_estimated_table_is_solved_and_says_how_uncertain_it_is(call):
+    lake = ("FrozenLake-v1", "--discount", "0.9", "--out", "lake.npz")
+    status, output, errors = call("expert", *lake, "--estimated", "12000")
+    assert (status, errors) == (0, "")
+    assert "The table was estimated from 12,000 steps: 44 pairs" in output
+    found = re.search(r"V\* of the start: (\S+), 95% interval (\S+) to (\S+)\b", output)
+    value, low, high = (float(each) for each in present(found).groups())
+    truth = float(solve(make_task("FrozenLake-v1", discount=0.9))(0).max())
+    assert low < truth < high
+    assert low < value < high
+    assert "estimated from 12,000 steps" in load_values("lake.npz").method
+
+
+def test_keys_can_be_left_out_only_of_observations_that_have_some(call):
+    status, _, errors = call("expert", *QUICK, "--observe", "angle,speed")
+    assert status == 2
+    assert "observe = ['angle', 'speed']; only an observation of several parts" in errors
 
 
 def test_a_file_is_checked_and_drawn(call, pole, tmp_path):

@@ -60,7 +60,7 @@ def test_a_wrong_file_is_refused_in_one_line_before_any_work(call, place, comman
 
 @pytest.mark.parametrize("message", ["one\ntwo\n  three", ""])
 def test_an_unexpected_error_of_a_library_is_one_line(call, monkeypatch, message):
-    def fail(path, *, large):
+    def fail(*_, **__):
         raise ZeroDivisionError(message)
 
     monkeypatch.setattr("qbumpers.experiments.sources.load_experiment", fail)
@@ -70,7 +70,7 @@ def test_an_unexpected_error_of_a_library_is_one_line(call, monkeypatch, message
 
 
 def test_a_file_that_ends_too_early_is_no_interruption(call, monkeypatch):
-    def fail(path, *, large):
+    def fail(*_, **__):
         raise EOFError("no data left in file")
 
     monkeypatch.setattr("qbumpers.experiments.sources.load_experiment", fail)
@@ -80,7 +80,7 @@ def test_a_file_that_ends_too_early_is_no_interruption(call, monkeypatch):
 
 
 def test_warnings_are_lines_without_the_place_in_the_code(call, monkeypatch):
-    def warn(path, *, large):
+    def warn(*_, **__):
         warnings.warn("something\nis slow", UserWarning, stacklevel=1)
         raise RequestError("enough")
 

@@ -7,7 +7,7 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experts import ExpertWarning, check_expert, train_expert
-from qbumpers.experts.checking import mean_with_error
+from qbumpers.experts.checking import check_threshold, mean_with_error
 from qbumpers.tasks import make_task
 from qbumpers.values import shipped, shipped_expert
 from tests.values.networks import constant, network_of
@@ -77,3 +77,30 @@ def test_a_task_with_numbered_states_is_refused(use):
     message = "task cliff-walking has numbered states and a table .* solved exactly, see solve"
     with pytest.raises(RequestError, match=message):
         use(make_task("cliff-walking"))
+
+
+class Balancing:
+    """Pushes the cart under the pole."""
+
+    def __call__(self, observation):
+        place, speed, angle, turning = observation
+        return np.array([0.0, angle + 0.3 * turning + 0.02 * place + 0.05 * speed])
+
+
+def test_a_policy_that_balances_the_pole_reaches_the_threshold():
+    found = check_threshold(make_task("CartPole-v1", discount=0.99), Balancing(), episodes=10)
+    assert found is not None
+    assert (found.returned.mean, found.threshold, found.reached) == (500.0, 475.0, True)
+
+
+def test_one_that_does_not_is_warned_of_with_what_to_try():
+    task = make_task("CartPole-v1", discount=0.99)
+    with pytest.warns(ExpertWarning, match="solved from 475 on; try more steps"):
+        found = check_threshold(task, lambda observation: np.array([1.0, 0.0]), episodes=5)
+    assert found is not None
+    assert not found.reached
+
+
+def test_there_is_no_threshold_of_shorter_episodes():
+    short = make_task("CartPole-v1", discount=0.99, episode_limit=100)
+    assert check_threshold(short, Balancing()) is None

@@ -5,6 +5,7 @@ import pytest
 from qbumpers.errors import RequestError
 from qbumpers.experts.choosing import best
 from qbumpers.experts.selecting import make_recipe, train_best
+from qbumpers.experts.training import GENERAL, Recipe
 from qbumpers.tasks import make_task
 from qbumpers.values import load_values
 
@@ -23,6 +24,14 @@ def test_a_recipe_has_the_discount_of_the_task_and_what_was_asked_for():
     assert (recipe.steps, recipe.random_start, recipe.learner.discount) == (1500, 0, 0.9)
     assert recipe.learner.learning_rate == 1e-3
     assert tuple(recipe.learner.network) == ((8,), "relu", 0)
+
+
+def test_the_lander_is_learned_by_the_papers_recipe_and_others_by_a_general_one():
+    assert make_recipe(make_task("lunar-lander")) == Recipe()
+    pole = make_recipe(POLE)
+    assert pole.general
+    assert pole.learner.discount == 0.9
+    assert pole._replace(learner=GENERAL.learner) == GENERAL
 
 
 def test_a_setting_out_of_range_is_refused():

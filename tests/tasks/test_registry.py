@@ -75,11 +75,14 @@ def test_an_environment_with_vectors_makes_a_task_of_its_own_kind():
     assert task.make_stepper().step
 
 
-def test_an_environment_of_neither_kind_is_refused():
+def test_an_environment_without_numbered_actions_is_refused():
     with pytest.raises(RequestError, match="'Pendulum-v1': its action space is Box"):
         make_task("Pendulum-v1", discount=0.9)
-    with pytest.raises(RequestError, match="'Blackjack-v1': its observation space is Tuple"):
-        make_task("Blackjack-v1", discount=0.9)
+
+
+def test_an_environment_of_several_numbers_is_observed_as_a_vector():
+    cards = make_task("Blackjack-v1", discount=1.0, episode_limit=20)
+    assert (cards.observation_size, cards.actions) == (32 + 11 + 2, 2)
 
 
 @pytest.mark.usefixtures("own_tasks")
@@ -183,7 +186,7 @@ def test_what_gives_no_environment_is_named(ask, message):
 @pytest.mark.parametrize("name", ["FrozenLake-v1", "CartPole-v1"])
 def test_the_limit_has_two_words(name):
     tasks = [
-        make_task(name, discount=0.9, **{word: 7})
+        make_task(name, discount=0.9, **cast(Any, {word: 7}))
         for word in ("episode_limit", "max_episode_steps")
     ]
     assert tasks[0].digest() == tasks[1].digest()

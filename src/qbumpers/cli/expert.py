@@ -53,20 +53,51 @@ Corrected = Annotated[
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
+Observe = Annotated[
+    str | None,
+    typer.Option(
+        help="Keys of a Dict observation that are kept; all if left out.", metavar="KEY,KEY,..."
+    ),
+]
+Estimated = Annotated[
+    int | None,
+    typer.Option(
+        help="Estimate a table from so many steps, if states are numbered.",
+        metavar="N",
+        min=1,
+    ),
+]
 Seeds = Annotated[
     int, typer.Option(help="Experts to train, with seeds 0, 1, ...", metavar="N", min=1)
 ]
-Steps = Annotated[int, typer.Option(help="Of training each.", metavar="N", min=1)]
-Activation = Annotated[str, typer.Option(help="Of hidden units.", metavar="tanh|relu")]
-Hidden = Annotated[str, typer.Option(help="Units of each hidden layer.", metavar="N,N,...")]
-LearningRate = Annotated[float, typer.Option(help="Of Adam.", metavar="NUMBER")]
+Steps = Annotated[
+    int | None,
+    typer.Option(
+        help="Of training each.", metavar="N", min=1,
+        show_default="200,000; 400,000 of the lunar lander",
+    ),
+]  # fmt: skip
+Activation = Annotated[
+    str | None, typer.Option(help="Of hidden units.", metavar="tanh|relu", show_default="tanh")
+]
+Hidden = Annotated[
+    str | None,
+    typer.Option(help="Units of each hidden layer.", metavar="N,N,...", show_default="64,64"),
+]
+LearningRate = Annotated[
+    float | None,
+    typer.Option(
+        help="Of Adam.", metavar="NUMBER", show_default="0.00025; 0.0005 of the lunar lander"
+    ),
+]
 RandomStart = Annotated[
-    int,
+    int | None,
     typer.Option(
         "--random-start",
         "--opening",
         help="Random actions before each episode of training.",
         metavar="N",
+        show_default="0; 50 of the lunar lander",
     ),
 ]
 
@@ -84,20 +115,24 @@ def expert(
     corrected: Corrected = None,
     discount: Discount = None,
     imports: Imports = None,
+    observe: Observe = None,
+    estimated: Estimated = None,
     seeds: Seeds = 10,
-    steps: Steps = 400_000,
-    activation: Activation = "tanh",
-    hidden: Hidden = "64,64",
-    learning_rate: LearningRate = 5e-4,
-    random_start: RandomStart = 50,
+    steps: Steps = None,
+    activation: Activation = None,
+    hidden: Hidden = None,
+    learning_rate: LearningRate = None,
+    random_start: RandomStart = None,
 ) -> None:
     """Train or solve the action values of an assistant, and check them.
 
-    A task with a transition table is solved exactly. Any other is learned by Double DQN, by the
-    paper's recipe as it stands, with several seeds. The best is kept: the one with the most
-    successes in 100 episodes with 2% random actions; among equals, with 10% random actions; among
-    equals, after 50 random actions at the beginning. If the task has no success, mean
-    returns decide instead. Training that was stopped goes on with the seeds that are missing.
+    A task with a transition table is solved exactly, an estimated one too. Any other is learned
+    by Double DQN with several seeds: the lunar lander by the paper's recipe as it stands, others
+    by a general one, and what Gymnasium counts as solved is checked. The best is kept: the
+    one with the most successes in 100 episodes with 2% random actions; among equals, with 10%
+    random actions; among equals, after 50 random actions at the beginning. If the task has no
+    success, mean returns decide instead. Training that was stopped goes on with the seeds that
+    are missing.
 
     A model that Stable-Baselines3 saved is converted in place of training. If it saw normalised
     observations, give the statistics too: its own file does not hold them. Such files can hold
@@ -109,7 +144,8 @@ def expert(
     from qbumpers.tasks import make_task
 
     import_modules(imports or (), "--import")
-    made = make_task(task, discount=discount)
+    keys = None if observe is None else [key for key in observe.split(",") if key]
+    made = make_task(task, discount=discount, observe=keys, estimated=estimated)
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     _check_conversion(made, check, convert, statistics)
@@ -133,7 +169,7 @@ def expert(
             recipe = make_recipe(
                 made,
                 steps=steps,
-                hidden=_hidden(hidden),
+                hidden=None if hidden is None else _hidden(hidden),
                 activation=activation,
                 learning_rate=learning_rate,
                 random_start=random_start,
@@ -194,6 +230,7 @@ def _hidden(text: str) -> list[int]:
 
 def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
+    from qbumpers.experts.checking import check_threshold
     from qbumpers.experts.selecting import train_best
 
     with _steps_bar() as bar:
@@ -208,6 +245,13 @@ def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None
     OUTPUT.print(_judgements(task, seeds, found.judgements))
     with expert_warnings_printed():
         check_expert(task, found.values)
+        solved = check_threshold(task, found.values)
+    if solved is not None and solved.reached:
+        OUTPUT.print(
+            f"Greedy episodes return {solved.returned.mean:.1f}; the environment counts as solved "
+            f"from {solved.threshold:g} on.",
+            soft_wrap=True,
+        )
     OUTPUT.print(
         f"Kept seed {seeds[found.best]} in [bold]{escape(str(path))}[/bold]; all of them are in "
         f"{escape(str(found.folder))}",
@@ -322,7 +366,7 @@ def _draw(checks: "pl.DataFrame", path: Path, folder: Path) -> None:
 def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path: Path) -> None:
     from qbumpers.experts.loading import load_table
     from qbumpers.experts.tables import check_exactness
-    from qbumpers.values import solve
+    from qbumpers.values import solve, start_interval
 
     if figures is not None:
         raise RequestError(f"--figures {figures}: a table needs none, it is compared exactly")
@@ -335,6 +379,13 @@ def _solve_or_check(task: "Task", check: Path | None, figures: Path | None, path
         f"mean {found.mean_error:.2g}",
         soft_wrap=True,
     )
+    if task.estimate is not None:
+        start = start_interval(task)
+        OUTPUT.print(
+            f"The table was {task.estimate.words()}. V* of the start: {start.value:.3g}, 95% "
+            f"interval {start.low:.3g} to {start.high:.3g}",
+            soft_wrap=True,
+        )
     if check is None:
         values.save(path)
         OUTPUT.print(f"Values: [bold]{escape(str(path))}[/bold]", soft_wrap=True)

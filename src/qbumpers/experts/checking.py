@@ -4,6 +4,7 @@ import math
 import warnings
 from typing import NamedTuple
 
+import gymnasium
 import numpy as np
 
 from qbumpers.experts.episodes import play_several
@@ -37,6 +38,23 @@ class ExpertCheck(NamedTuple):
     def better(self) -> bool:
         """Whether the expert's mean return is above that of random actions."""
         return self.expert.mean > self.random.mean
+
+
+class ThresholdCheck(NamedTuple):
+    """How an expert fares by the threshold that Gymnasium states for its environment.
+
+    Attributes:
+        returned: mean undiscounted return of greedy episodes.
+        threshold: from which on the environment counts as solved.
+    """
+
+    returned: MeanWithError
+    threshold: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether the environment counts as solved."""
+        return self.returned.mean >= self.threshold
 
 
 def mean_with_error(numbers: np.ndarray) -> MeanWithError:
@@ -84,6 +102,42 @@ def check_expert(
             f"values of task {task.name}: their greedy policy returns {found.expert.mean:.1f} "
             f"per episode and random actions {found.random.mean:.1f}, so assistance by them steers "
             "towards worse actions, and results say nothing about the method",
+            ExpertWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def check_threshold(
+    task: Task, values: QValues, *, episodes: int = 100, seed: int = 0
+) -> ThresholdCheck | None:
+    """Compare greedy play with `reward_threshold` of a Gymnasium environment; warn if it is below.
+
+    Args:
+        task: what is played.
+        values: Q* of the expert.
+        episodes: how many, at least 1.
+        seed: decides chance of the environment; not negative.
+
+    Returns:
+        What was found; None if no threshold is stated, or the task's episodes are shorter than
+        those that it is stated for.
+
+    Warns:
+        ExpertWarning: if the mean return is below the threshold.
+    """
+    spec = gymnasium.registry.get(task.name)
+    stated = None if spec is None else spec.reward_threshold
+    if spec is None or stated is None or task.episode_limit < (spec.max_episode_steps or 0):
+        return None
+    played = play_several(task, values, episodes, seed=seed)
+    returns = np.array([episode.rewards.sum() for episode in played])
+    found = ThresholdCheck(mean_with_error(returns), stated)
+    if not found.reached:
+        warnings.warn(
+            f"values of task {task.name}: their greedy policy returns {found.returned.mean:.1f} "
+            f"per episode, and the environment counts as solved from {stated:g} on; try more "
+            "steps, more seeds, another learning rate or other hidden layers",
             ExpertWarning,
             stacklevel=2,
         )

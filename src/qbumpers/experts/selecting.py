@@ -1,4 +1,4 @@
-"""Training several experts by the paper's recipe, and storing the best of them in a file."""
+"""Training several experts alike, and storing the best of them in a file."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 from qbumpers.errors import checked
 from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
-from qbumpers.experts.training import Recipe
+from qbumpers.experts.training import GENERAL, Recipe
 from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
+from qbumpers.values.shipped import shipped_experts
 
 
 class Selection(NamedTuple):
@@ -29,19 +30,25 @@ class Selection(NamedTuple):
     folder: Path
 
 
+def usual_recipe(task: Task) -> Recipe:
+    """The paper's recipe for a task that an expert ships for, a general one for any other."""
+    recipe = Recipe() if task.name in shipped_experts() else GENERAL
+    return recipe._replace(learner=recipe.learner._replace(discount=task.discount))
+
+
 def make_recipe(
     task: Task,
     *,
-    steps: int,
-    hidden: Sequence[int],
-    activation: str,
-    learning_rate: float,
-    random_start: int,
+    steps: int | None = None,
+    hidden: Sequence[int] | None = None,
+    activation: str | None = None,
+    learning_rate: float | None = None,
+    random_start: int | None = None,
 ) -> Recipe:
-    """The paper's recipe at the discount of a task, with some of its settings changed.
+    """The usual recipe of a task, with some of its settings changed; None leaves one.
 
     Args:
-        task: to be learned.
+        task: to be learned, at its discount.
         steps: environment steps of training, of each expert.
         hidden: units of each hidden layer.
         activation: what hidden units do, "tanh" or "relu".
@@ -51,14 +58,21 @@ def make_recipe(
     Raises:
         RequestError: naming each setting that is out of range.
     """
-    usual = Recipe().learner
+    usual = usual_recipe(task)
+    network = usual.learner.network
     learner = {
-        **usual._asdict(),
-        "network": {"hidden": tuple(hidden), "activation": activation},
-        "learning_rate": learning_rate,
-        "discount": task.discount,
+        **usual.learner._asdict(),
+        "network": {
+            "hidden": network.hidden if hidden is None else tuple(hidden),
+            "activation": network.activation if activation is None else activation,
+        },
+        "learning_rate": usual.learner.learning_rate if learning_rate is None else learning_rate,
     }
-    return Recipe(checked(type(usual), learner, "expert"), steps, random_start)
+    return usual._replace(
+        learner=checked(type(usual.learner), learner, "expert"),
+        steps=usual.steps if steps is None else steps,
+        random_start=usual.random_start if random_start is None else random_start,
+    )
 
 
 def train_best(

@@ -84,7 +84,7 @@ def outcomes_of_table(
                     f"table[{s}][{a}]: next state = {row[1]!r}; a whole number is needed"
                 )
     if success is None and crash is None:
-        events = _endings(terminated, reward, probability)
+        events = endings(terminated, reward, probability)
     else:
         judges = {"success": success, "crash": crash}
         events = {name: _judged(table, shape, judge) for name, judge in judges.items()}
@@ -108,10 +108,19 @@ def _judged(table: Table, shape: tuple[int, int, int], judge: Judge | None) -> n
     return judged
 
 
-def _endings(
+def endings(
     terminated: np.ndarray, reward: np.ndarray, probability: np.ndarray
 ) -> dict[str, np.ndarray | None]:
-    """If some ending pays: those that do are successes, and the others crashes."""
+    """If some ending pays: those that do are successes, and the others crashes.
+
+    Args:
+        terminated: bool [S, A, K].
+        reward: float [S, A, K].
+        probability: float [S, A, K].
+
+    Returns:
+        Fields `success` and `crash` of a task; None if no ending pays.
+    """
     endings = terminated & (probability > 0)
     paid = endings & (reward > 0)
     # Absorbing states loop on themselves with reward 0; no episode gets there, they do not matter.
@@ -166,7 +175,9 @@ def description_of(environment: Any, episode_limit: int | None) -> Description:
             "probability of each first state, float [S], or give table and start"
         )
         raise RequestError(
-            f"environment {name} has {lacks} with TabularTask.from_table or TabularTask.from_arrays"
+            f"environment {name} has {lacks} with TabularTask.from_table or "
+            "TabularTask.from_arrays, have it estimated with TabularTask.estimated, or do without "
+            "by VectorTask.from_gymnasium"
         )
     reward = followed_reward(environment, name)
     first_state, first_action = _starts(environment, name, table)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium import spaces, wrappers
 
 from qbumpers.random_streams import content_digest
 from qbumpers.tasks.dynamics import TERMINATED, Dynamics
@@ -42,7 +42,8 @@ def environment_digest(environment: Any) -> str:
     """A SHA-256 of what a Gymnasium environment was made from: id, arguments, and wrappers.
 
     Args:
-        environment: with its spec; wrappers that only watch do not count, nor does drawing.
+        environment: with its spec; wrappers that only watch or flatten do not count, nor does
+            drawing.
 
     Returns:
         The digest, equal if an argument is given or left at the same default; empty if it has no
@@ -59,9 +60,20 @@ def environment_digest(environment: Any) -> str:
         bound.apply_defaults()
         arguments = dict(bound.arguments)
     arguments.pop("render_mode", None)
-    around = [type(layer).__name__ for layer in altering_wrappers(environment)]
+    around = [_described(layer) for layer in altering_wrappers(environment)]
+    around = [each for each in around if each]
     described = {name: repr(value) for name, value in arguments.items()}
     return content_digest([environment.spec.id, described, around]).hex()
+
+
+def _described(layer: Any) -> Any:
+    """What a wrapper changes, JSON-like; nothing if that does not change what actions are worth."""
+    if type(layer) is wrappers.FlattenObservation:
+        return None  # the same numbers in a row
+    if type(layer) is wrappers.FilterObservation:
+        kept: Any = layer.observation_space
+        return ["FilterObservation", sorted(kept.spaces)]
+    return type(layer).__name__
 
 
 def task_inside(environment: Any) -> Any:

@@ -1,17 +1,17 @@
 """Tasks by name: the package's own, and Gymnasium environments of two kinds."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from typing import Any
 
 import gymnasium
-from gymnasium import spaces
 
 from qbumpers.errors import RequestError, in_short, suggestion, unknown_name
 from qbumpers.imports import import_modules, module_and_name
 from qbumpers.registration import is_written_here
 from qbumpers.tasks.cliff_walking import cliff_walking
+from qbumpers.tasks.identity import has_table
 from qbumpers.tasks.stepping import environment_name, make_environment, maker_name
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task, check_task
@@ -67,43 +67,58 @@ def make_task(
     discount: float | None = None,
     episode_limit: int | None = None,
     max_episode_steps: int | None = None,
+    observe: Sequence[str] | None = None,
+    success_key: str | None = None,
+    crash_key: str | None = None,
+    estimated: int | None = None,
     **arguments: Any,
 ) -> Task:
     """A task by name, or of a Gymnasium environment.
 
     Args:
         name: a registered name such as "cliff-walking", or the id of a Gymnasium environment with
-            a transition table such as "FrozenLake-v1", or with numbered actions and a vector
-            observation such as "CartPole-v1"; after the module that registers it, if need be, as
-            in "minigrid:MiniGrid-Empty-5x5-v0". Or such an environment itself, if Gymnasium can
-            make it again, or a function or class that makes one.
+            a transition table such as "FrozenLake-v1", or with numbered actions such as
+            "CartPole-v1"; after the module that registers it, if need be, as in
+            "minigrid:MiniGrid-Empty-5x5-v0". Or such an environment itself, if Gymnasium can make
+            it again, or a function or class that makes one.
         discount: of a Gymnasium environment, which states none; in (0, 1].
         episode_limit: of a Gymnasium environment, in steps; its own if None.
         max_episode_steps: what Gymnasium calls `episode_limit`; either may be given.
+        observe: keys of a Gymnasium environment's Dict observation, the others being left out.
+        success_key: key of a Gymnasium environment's `info`; see `VectorTask.from_gymnasium`.
+        crash_key: the same for crashes.
+        estimated: steps of a Gymnasium environment with numbered states, from which a table is
+            estimated; see `TabularTask.estimated`.
         **arguments: of the task, for example `seed=0` of "lunar-lander", or of the Gymnasium
             environment, for example `is_slippery=True`.
 
     Returns:
-        The task, a TabularTask if there is a transition table.
+        The task, a TabularTask if there is a transition table or one is estimated.
 
     Raises:
         RequestError: if no task or environment has the name, the module cannot be imported, the
             environment cannot be made again, or an argument does not suit it.
     """
     limit = _one_limit(episode_limit, max_episode_steps)
+    asked = {
+        "observe": observe, "success_key": success_key, "crash_key": crash_key,
+        "estimated": estimated,
+    }  # fmt: skip
+    view = {field: value for field, value in asked.items() if value is not None}
     if isinstance(name, gymnasium.Env):
-        return _of_environment(name, discount, limit, arguments)
+        return _of_environment(name, discount, limit, view, arguments)
     if callable(name):
-        return _of_maker(name, discount, limit, arguments)
+        return _of_maker(name, discount, limit, view, arguments)
     name = _name_after_import(name)
     if name in _tasks:
         numbers = {"discount": discount, "episode_limit": limit}
         given = {field: value for field, value in numbers.items() if value is not None}
+        given |= view
         return _registered(name, {**given, **arguments})
     if name not in gymnasium.registry:
         known = [*_tasks, *tabular_environments(), *vector_environments()]
         raise unknown_name("task", in_short(name)[1:-1], known, _MODULE_MISSING)
-    return _of_maker(name, discount, limit, arguments)
+    return _of_maker(name, discount, limit, view, arguments)
 
 
 def as_task(task: Task | Named, discount: float | None = None) -> Task:
@@ -146,31 +161,57 @@ def _name_after_import(task: Any) -> str:
 
 
 def _of_maker(
-    maker: str | Maker, discount: float | None, limit: int | None, arguments: dict[str, Any]
+    maker: str | Maker,
+    discount: float | None,
+    limit: int | None,
+    view: Mapping[str, Any],
+    arguments: dict[str, Any],
 ) -> Task:
     """A task of an environment that its id or a function makes."""
     name = repr(maker) if isinstance(maker, str) else maker_name(maker)
-    discount = _needed(discount, name, arguments)
+    numbers = {"discount": _needed(discount, name, arguments), "episode_limit": limit}
     with closing(make_environment(maker, **arguments)) as environment:
-        # A wrapper may show a numbered state as a vector.
-        if isinstance(environment.observation_space, spaces.Discrete):
-            return TabularTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
-    return VectorTask.from_gymnasium(maker, discount=discount, episode_limit=limit, **arguments)
+        found = _with_table(environment, name, numbers, view)
+    return found or VectorTask.from_gymnasium(maker, **numbers, **view, **arguments)
 
 
 def _of_environment(
-    environment: Any, discount: float | None, limit: int | None, arguments: dict[str, Any]
+    environment: Any,
+    discount: float | None,
+    limit: int | None,
+    view: Mapping[str, Any],
+    arguments: dict[str, Any],
 ) -> Task:
     """A task of an environment that is made already."""
     name = environment_name(environment)
-    discount = _needed(discount, name, arguments)
+    numbers = {"discount": _needed(discount, name, arguments), "episode_limit": limit}
     if arguments:
         raise RequestError(
             f"task {name}: {', '.join(arguments)} cannot be given; the environment is made already"
         )
-    if isinstance(environment.observation_space, spaces.Discrete):
-        return TabularTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
-    return VectorTask.from_gymnasium(environment, discount=discount, episode_limit=limit)
+    found = _with_table(environment, name, numbers, view)
+    return found or VectorTask.from_gymnasium(environment, **numbers, **view)
+
+
+def _with_table(
+    environment: Any, name: str, numbers: Mapping[str, Any], view: Mapping[str, Any]
+) -> TabularTask | None:
+    """A task with the table that an environment has, or an estimated one; None if with neither."""
+    if "estimated" in view:
+        keys = {field: value for field, value in view.items() if field != "estimated"}
+        _check_unused(name, "a table is estimated of numbered states", keys, ("observe",))
+        return TabularTask.estimated(environment, steps=view["estimated"], **numbers, **keys)
+    if not has_table(environment):  # a wrapper may show a numbered state as a vector
+        return None
+    _check_unused(name, "its table tells what happens", view, view)
+    return TabularTask.from_gymnasium(environment, **numbers)
+
+
+def _check_unused(name: str, why: str, given: Mapping[str, Any], unused: Iterable[str]) -> None:
+    """RequestError if something was given that the task has no use for."""
+    for field in unused:
+        if field in given:
+            raise RequestError(f"task {name}: {field} = {given[field]!r}; leave it out: {why}")
 
 
 def _needed(discount: float | None, name: str, arguments: Mapping[str, Any]) -> float:

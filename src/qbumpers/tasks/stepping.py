@@ -17,7 +17,7 @@ from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.undoing import undo_of
 from qbumpers.tasks.wrapping import layers
 
-REVISION = 1
+REVISION = 2
 """Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
 
 _NOTHING = object()
@@ -73,13 +73,12 @@ class GymnasiumStepper:
     `snapshot` and `restore` are those of the environment, and refused if it has none.
 
     Args:
-        maker: id of the environment, or what makes it; the step limit of what it makes holds too.
-        arguments: what the environment takes besides, by name.
+        make: makes the environment, without a step limit; its `info` has `success` and `crash` if
+            it tells them.
     """
 
-    def __init__(self, maker: str | Callable[..., Any], arguments: Mapping[str, Any]) -> None:
-        unlimited = {"max_episode_steps": -1} if isinstance(maker, str) else {}
-        self._environment = make_environment(maker, **unlimited, **arguments)
+    def __init__(self, make: Callable[[], Any]) -> None:
+        self._environment = make()
         self._first_action = int(self._environment.action_space.start)
 
     def reset(self, chance: float) -> np.ndarray:

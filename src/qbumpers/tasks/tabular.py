@@ -28,6 +28,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
 from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, Dynamics
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.estimation import Estimate, estimated_table
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.stepping import Stepper, remade_by
 from qbumpers.tasks.task import distance_between
@@ -58,6 +59,7 @@ class TabularTask:
         seen: int [S], number of what the assistant sees of each state, if it is less than all.
         first_state: number that its environment gives to state 0; it counts on from there.
         first_action: number that its environment gives to action 0.
+        estimate: how the table was estimated; None if it is known. No part of the digest.
         make_display: makes `display` of the task; no part of its digest.
         environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
             digest.
@@ -83,6 +85,7 @@ class TabularTask:
     seen: np.ndarray | None = None
     first_state: int = 0
     first_action: int = 0
+    estimate: Estimate | None = None
     make_display: Callable[["TabularTask"], Any] | None = None
     environment_spec: EnvSpec | None = None
 
@@ -337,6 +340,52 @@ class TabularTask:
         )  # fmt: skip
         check_agreement(numbered, environment.unwrapped, found.reward)
         return numbered
+
+    @classmethod
+    def estimated(
+        cls,
+        environment: Any,
+        *,
+        discount: float,
+        steps: int,
+        seed: int = 0,
+        episode_limit: int | None = None,
+        success_key: str | None = None,
+        crash_key: str | None = None,
+    ) -> "TabularTask":
+        """A task from a Gymnasium environment with numbered states, its table being estimated.
+
+        In each state the action that was tried least is tried, one of several at random.
+        Probabilities are relative frequencies (maximum likelihood), rewards means. A pair of a
+        state and an action that was never tried counts as the worst that could be: the end of the
+        episode, at the cost of the worst reward in every step of a whole one. `estimate` says how
+        often each was tried, and `qbumpers.values.start_interval` how uncertain V* is.
+
+        Args:
+            environment: with Discrete observations and actions; it is stepped.
+            discount: in (0, 1].
+            steps: of the environment, at least 1.
+            seed: decides actions and episodes; not negative.
+            episode_limit: steps; the environment's own limit if None.
+            success_key: as for `VectorTask.from_gymnasium`; without either key in `info`, and if
+                some ending pays, successes and crashes are as for `from_table`.
+            crash_key: the same for crashes.
+
+        Returns:
+            The task.
+
+        Raises:
+            RequestError: if states or actions are not numbered, no limit is known, or a number is
+                out of range.
+
+        Warns:
+            EstimateWarning: if a pair that an episode can meet was tried fewer than ten times.
+        """
+        found: Any = estimated_table(
+            environment, discount=discount, steps=steps, seed=seed, episode_limit=episode_limit,
+            success_key=success_key, crash_key=crash_key,
+        )  # fmt: skip
+        return cls(**found, discount=discount, make_display=display_maker(environment))
 
 
 def _cumulative(probability: np.ndarray) -> np.ndarray:

@@ -85,6 +85,11 @@ class Task(Protocol):
         ...
 
     @property
+    def estimate(self) -> Any:
+        """What its table was estimated from; None if it is known, or there is none."""
+        ...
+
+    @property
     def events(self) -> frozenset[str]:
         """Which of "success" and "crash" the task announces."""
         ...

@@ -1,7 +1,7 @@
 """Tasks whose observations are vectors."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +14,12 @@ from gymnasium.wrappers import TimeLimit
 
 from qbumpers.errors import RequestError
 from qbumpers.random_streams import content_digest
+from qbumpers.tasks.announcing import found_keys
 from qbumpers.tasks.checking import check_common
 from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.dynamics import Dynamics
 from qbumpers.tasks.identity import environment_digest
+from qbumpers.tasks.observing import View, is_vector, make_viewed, viewed
 from qbumpers.tasks.stepping import (
     REVISION,
     GymnasiumStepper,
@@ -98,6 +100,7 @@ class VectorTask:
     states = 0
     grid = None
     seen = None
+    estimate = None
     releases_gil = False
     learners = ("double-dqn",)
     value_sources = ("expert",)
@@ -199,20 +202,27 @@ class VectorTask:
         *,
         discount: float,
         episode_limit: int | None = None,
+        observe: Sequence[str] = (),
+        success_key: str | None = None,
+        crash_key: str | None = None,
         **arguments: Any,
     ) -> "VectorTask":
-        """A task from a Gymnasium environment with numbered actions and a vector observation.
+        """A task from a Gymnasium environment with numbered actions.
 
-        Every episode is seeded by itself, and must follow from its seed and its actions alone: two
-        are played twice. Wrappers are part of the environment. Successes and crashes are known if
-        `info` has the keys `success` and `crash` at reset or after the first step. Steps can be
-        undone if `undo_of` says so of the environment.
+        An observation that is no vector is made one by Gymnasium's FlattenObservation, unscaled:
+        numbers of a Discrete space become one-hot vectors. Every episode is seeded by itself, and
+        must follow from its seed and its actions alone: two are played twice. Wrappers are part of
+        the environment. Steps can be undone if `undo_of` says so of the environment.
 
         Args:
             environment: its id, for example "CartPole-v1"; a function or class that makes
                 it; or an environment of `gymnasium.make`, which is made again with its wrappers.
             discount: in (0, 1]; Gymnasium's environments state none.
             episode_limit: steps; the environment's own limit if None.
+            observe: keys of a Dict observation, the others being left out; all if empty.
+            success_key: key of `info` that tells a success, at whatever step. If None, the first of
+                "success" and "is_success" that some random episode shows.
+            crash_key: the same for a crash; "crash" or "crashed".
             **arguments: of the environment, JSON-like.
 
         Returns:
@@ -220,8 +230,11 @@ class VectorTask:
 
         Raises:
             RequestError: if there is no such environment or it cannot be made, its actions are
-                not Discrete or its observations not a vector, no limit is known, or an episode
-                depends on those before it.
+                not Discrete or its observations cannot be made vectors, no limit is known, or an
+                episode depends on those before it.
+
+        Warns:
+            UserWarning: if a key was given that no random episode showed.
         """
         maker: Any = environment
         if isinstance(environment, gymnasium.Env):
@@ -229,49 +242,69 @@ class VectorTask:
             maker, arguments = maker_of(environment)
         with closing(make_environment(maker, **arguments)) as environment:
             name = maker if isinstance(maker, str) else environment_name(environment)
-            _check_spaces(name, environment)
-            _check_repeatable(name, environment)
-            announced, undoable = _announced(environment), can_undo(environment)
-            stepped_by = stepped_by_of(environment)
+            check_actions(name, environment)
+            made_by = _made_by(maker, environment)
+            shown = is_vector(environment.observation_space)  # displays show what is not flattened
+            observed = viewed(environment, name, View(tuple(observe)))
+            _check_repeatable(name, observed)
+            found = found_keys(name, observed, success_key, crash_key)
+            view = View(tuple(observe), found.keys)
+            environment = viewed(environment, name, view)
+            undoable, stepped_by = can_undo(environment), stepped_by_of(environment)
             limit = step_limit(environment) if episode_limit is None else episode_limit
             spec = remade_by(environment, limit)
         if limit is None:
             raise RequestError(f"environment {name} has no step limit: give episode_limit")
         return cls(
             name=name,
-            make_stepper=functools.partial(GymnasiumStepper, maker, arguments),
-            make_environment=_maker_for_participants(maker, limit, arguments),
+            make_stepper=functools.partial(
+                GymnasiumStepper, _maker_for_simulators(maker, view, arguments)
+            ),
+            make_environment=_maker_for_participants(maker, view, limit, arguments),
             observation_size=environment.observation_space.shape[0],
             actions=int(environment.action_space.n),
             discount=discount,
             episode_limit=limit,
-            settings={"environment": name, "arguments": arguments, **_made_by(maker, environment)},
-            has_success="success" in announced,
-            has_crash="crash" in announced,
+            settings={"environment": name, "arguments": arguments, **made_by, **view.settings()},
+            has_success=found.success,
+            has_crash=found.crash,
             undoable=undoable,
             first_action=int(environment.action_space.start),
             origin=environment_digest(environment),
-            make_display=display_maker(environment),
+            make_display=display_maker(environment) if shown else None,
             environment_spec=spec,
             stepped_by=stepped_by,
             revision=REVISION,
         )
 
 
+def _maker_for_simulators(
+    maker: Any, view: View, arguments: Mapping[str, Any]
+) -> Callable[[], gymnasium.Env[Any, Any]]:
+    """Makes the environment without a step limit, unless a function makes it with one."""
+    unlimited = {"max_episode_steps": -1} if isinstance(maker, str) else {}
+    return functools.partial(make_viewed, maker, view, **unlimited, **arguments)
+
+
 def _maker_for_participants(
-    maker: Any, limit: int, arguments: Mapping[str, Any]
+    maker: Any, view: View, limit: int, arguments: Mapping[str, Any]
 ) -> Callable[..., gymnasium.Env[Any, Any]]:
     if isinstance(maker, str):
-        return functools.partial(gymnasium.make, maker, max_episode_steps=limit, **arguments)
-    return functools.partial(_limited, maker, limit, arguments)
+        return functools.partial(make_viewed, maker, view, max_episode_steps=limit, **arguments)
+    return functools.partial(_limited, maker, view, limit, arguments)
 
 
 def _limited(
-    maker: Any, limit: int, arguments: Mapping[str, Any], *, render_mode: str | None = None
+    maker: Any,
+    view: View,
+    limit: int,
+    arguments: Mapping[str, Any],
+    *,
+    render_mode: str | None = None,
 ) -> gymnasium.Env[Any, Any]:
     """What a function makes, with a step limit if it has another or none."""
     drawn = {} if render_mode is None else {"render_mode": render_mode}
-    environment = make_environment(maker, **arguments, **drawn)
+    environment = make_viewed(maker, view, **arguments, **drawn)
     return environment if step_limit(environment) == limit else TimeLimit(environment, limit)
 
 
@@ -288,17 +321,16 @@ def _plain_facts(no_op: int, distance: np.ndarray | None) -> list[Any]:
     return [int(no_op), None if distance is None else np.asarray(distance, np.float64).tolist()]
 
 
-def _check_spaces(name: str, environment: Any) -> None:
+def check_actions(name: str, environment: Any) -> None:
+    """Check that an environment's actions are numbered.
+
+    Raises:
+        RequestError: if they are not.
+    """
     if not isinstance(environment.action_space, spaces.Discrete):
         raise RequestError(
             f"task {name!r}: its action space is {environment.action_space}; numbered actions "
             "(Discrete) are needed"
-        )
-    space = environment.observation_space
-    if not (isinstance(space, spaces.Box) and len(space.shape) == 1 and space.shape[0] > 0):
-        raise RequestError(
-            f"task {name!r}: its observation space is {space}; a vector of "
-            "numbers (Box with one dimension) is needed"
         )
 
 
@@ -326,10 +358,3 @@ def _beginning(environment: Any, seed: int) -> np.ndarray:
         if terminated or truncated:
             break
     return np.array(rows)
-
-
-def _announced(environment: Any) -> set[str]:
-    """Keys of `info` at reset and after a step."""
-    _, first = environment.reset(seed=0)
-    *_, info = environment.step(environment.action_space.start)
-    return {*first, *info}

@@ -7,6 +7,7 @@ import gymnasium
 from gymnasium import wrappers
 
 from qbumpers.errors import RequestError
+from qbumpers.tasks.announcing import Announced
 
 WATCHING = {
     wrappers.PassiveEnvChecker,
@@ -15,6 +16,7 @@ WATCHING = {
     wrappers.RecordEpisodeStatistics,
     wrappers.RecordVideo,
     wrappers.HumanRendering,
+    Announced,
 }
 """Wrappers that leave steps as they are, and go on whether or not a step is taken back."""
 

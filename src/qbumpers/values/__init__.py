@@ -11,10 +11,12 @@ from qbumpers.values.tabular import (
     decoded_values,
     load_values,
 )
+from qbumpers.values.uncertainty import StartInterval, start_interval
 
 __all__ = [
     "NetworkValues",
     "QValues",
+    "StartInterval",
     "TabularValues",
     "check_width",
     "decoded_values",
@@ -22,4 +24,5 @@ __all__ = [
     "load_values",
     "shipped_expert",
     "solve",
+    "start_interval",
 ]

@@ -64,10 +64,14 @@ def solve(
         table=np.round(table, DECIMALS) + 0.0,  # + 0.0 turns -0.0 into 0.0
         discount=discount,
         task=task.name,
-        method="exact dynamic programming",
+        method=f"exact dynamic programming{_of_estimate(tabular)}",
         made_for=transitions_digest(tabular.dynamics()),
         others={name: event_values(tabular, name) for name in others},
     )
+
+
+def _of_estimate(task: TabularTask) -> str:
+    return f" of a table that was {task.estimate.words()}" if task.estimate else ""
 
 
 def backup(task: TabularTask, state_values: np.ndarray, discount: float) -> np.ndarray:

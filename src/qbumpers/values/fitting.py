@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import gymnasium
+from gymnasium import spaces
 
 from qbumpers.errors import RequestError, counted, in_short
 from qbumpers.tasks.construction import description_of
@@ -11,6 +12,7 @@ from qbumpers.tasks.identity import (
     has_table,
     task_inside,
 )
+from qbumpers.tasks.observing import way_to_vectors
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task
 from qbumpers.tasks.wrapping import altering_wrappers
@@ -28,6 +30,7 @@ class Use(NamedTuple):
         actions: A.
         identity: as tasks have it; empty if it is not known.
         discount: of values that state none, in (0, 1]; None if it is not known.
+        advice: how the observation becomes a vector if it is none, for messages.
     """
 
     name: str
@@ -36,6 +39,7 @@ class Use(NamedTuple):
     actions: int
     identity: str = ""
     discount: float | None = None
+    advice: str = ""
 
     def needs(self) -> str:
         """What kind of values, in words."""
@@ -69,7 +73,10 @@ def use_in(environment: Any, name: str, states: int, inputs: int, stated: Any) -
     Raises:
         RequestError: naming a wrapper whose effect on what they were made for is not known.
     """
-    use = Use(f"environment {name}", states, inputs, int(environment.action_space.n))
+    use = Use(
+        f"environment {name}", states, inputs, int(environment.action_space.n),
+        advice=way_to_vectors(environment.observation_space),
+    )  # fmt: skip
     if not getattr(stated, "made_for", ""):
         return use
     return use._replace(identity=_identity_of(environment, name, stated.task))
@@ -85,14 +92,20 @@ def _identity_of(environment: Any, name: str, made_for: str) -> str:
     if task is None and (spec is None or spec.id != made_for):
         return ""
     registered = gymnasium.registry[spec.id].additional_wrappers if spec else ()
+    # A task may have these two besides; what is observed through them is compared.
+    known = {*(each.name for each in registered), "FlattenObservation", "FilterObservation"}
     for layer in altering_wrappers(environment):
         kind = type(layer).__name__
-        if kind not in [each.name for each in registered]:
+        if kind not in known:
             raise RequestError(
                 f"environment {name}: the values were made without wrapper {kind}; put it around "
                 f"shared control or leave it out, or, {MEANT}"
             )
-    return environment_digest(environment) if task is None else task.identity()
+    if task is not None:
+        return task.identity()
+    # A table of such an environment was estimated, and no two estimates are alike.
+    numbered = isinstance(environment.observation_space, spaces.Discrete)
+    return "" if numbered else environment_digest(environment)
 
 
 def check_fit(values: Any, use: Use) -> None:

@@ -108,7 +108,7 @@ class NetworkValues:
         if use.rows or (self.inputs, self.actions) != (use.inputs, use.actions):
             raise RequestError(
                 f"values of {self.task}: a network of {counted(self.inputs, 'input')} and "
-                f"{counted(self.actions, 'action')}; {use.name} needs {use.needs()}"
+                f"{counted(self.actions, 'action')}; {use.name} needs {use.needs()}{use.advice}"
             )
         check_made_for(self, use)
 

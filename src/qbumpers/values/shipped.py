@@ -1,12 +1,26 @@
 """The experts that ship with the package."""
 
 from importlib import resources
+from typing import Any
 
 from qbumpers.errors import RequestError
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.tabular import decoded_values
 
 _FOLDER = resources.files("qbumpers.values").joinpath("built_in")
+
+
+def shipped_experts() -> list[str]:
+    """Names of the tasks that an expert ships for."""
+    return sorted(_files())
+
+
+def _files() -> dict[str, Any]:
+    return {
+        file.name.removesuffix(".npz"): file
+        for file in (_FOLDER.iterdir() if _FOLDER.is_dir() else ())
+        if file.name.endswith(".npz")
+    }
 
 
 def shipped_expert(task: str) -> NetworkValues:
@@ -21,11 +35,7 @@ def shipped_expert(task: str) -> NetworkValues:
     Raises:
         RequestError: if none ships.
     """
-    shipped = {
-        file.name.removesuffix(".npz"): file
-        for file in (_FOLDER.iterdir() if _FOLDER.is_dir() else ())
-        if file.name.endswith(".npz")
-    }
+    shipped = _files()
     if task not in shipped:
         known = ", ".join(sorted(shipped)) or "no task"
         raise RequestError(
