@@ -50,9 +50,11 @@ def test_a_table_is_checked_against_the_exact_solution(call):
 
 
 def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
-    status, output, _ = call("expert", *QUICK, "--out", "expert.npz")
+    status, output, errors = call("expert", *QUICK, "--out", "expert.npz")
     assert status == 0
     assert "return, 10% after 50" in output
+    said = " ".join(errors.split())
+    assert "counts as solved from 475 on; try more steps, more seeds" in said
     assert "Kept seed" in output
     values = of_kind(NetworkValues, load_values("expert.npz"))
     assert "the best of seeds 0, 1; return" in values.method
