@@ -168,9 +168,11 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     """
     vector, pixels = (folder / f"{name}.{ending}" for ending in ("svg", "png"))
     with _style():
-        # Once for both, and not by `savefig`, which would draw everything twice for each.
+        # Laid out once for both; `savefig` would lay out and draw everything twice for each.
         drawing.dpi = _STYLE["savefig.dpi"]
-        drawing.draw_without_rendering()
+        engine = drawing.get_layout_engine()
+        if engine is not None:
+            engine.execute(drawing)
         drawing.set_layout_engine("none")
         canvas = FigureCanvasAgg(drawing)
         write_atomically(pixels, lambda path: canvas.print_png(path, metadata={"Software": None}))
