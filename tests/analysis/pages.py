@@ -70,7 +70,9 @@ def content(address):
 
 def number(value, digits=1):
     """A number as reports write it, a dash if there is none."""
-    return "–" if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    if value is None:
+        return "–"
+    return f"{round(value, digits):,.{max(0, digits)}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def interval(row, measure, digits=1):

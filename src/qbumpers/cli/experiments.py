@@ -204,8 +204,15 @@ def _analyse(folder: str) -> None:
         OUTPUT.print(_summary_table(str(learner[0]), rows))
     if PUBLISHED in findings.additions.tables:
         OUTPUT.print(_published_table(findings.additions.tables[PUBLISHED]))
-    for sentence in (*findings.headlines, *findings.cautions):
-        OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
+    for heading, sentences in (
+        *findings.headlines,
+        ("What to try next", findings.suggestions),
+        ("Keep in mind", findings.cautions),
+    ):
+        if heading and sentences:
+            OUTPUT.print(f"{escape(heading)}:", soft_wrap=True)
+        for sentence in sentences:
+            OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
     OUTPUT.print(f"Report: [bold]{escape(folder)}/{REPORT}[/bold]", soft_wrap=True)
 
 

@@ -16,7 +16,7 @@ from qbumpers.analysis.figures.style import (
     readable,
     save,
     setting,
-    stretch,
+    show_returns,
 )
 from tests.narrowing import present
 
@@ -117,8 +117,36 @@ def test_only_returns_of_very_different_size_are_stretched(axis):
             axes = drawing.subplots()
             axes.plot([0, deepest], [0, deepest])
             axes.margins(0)
-            stretch(axes, axis)
+            show_returns(axes, axis)
         assert {"x": axes.get_xscale(), "y": axes.get_yscale()}[axis] == scale
     along = axes.xaxis if axis == "x" else axes.yaxis
     for place, label in zip(along.get_ticklocs(), along.get_ticklabels(), strict=True):
         assert float(label.get_text().replace(",", "").replace("\N{MINUS SIGN}", "-")) == place
+
+
+def test_returns_of_millions_are_written_in_full_and_not_stretched():
+    with figure(9, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([8.0e6, 8.4e6], [-8.4e6, -8.0e6])
+        show_returns(axes, "x")
+        show_returns(axes, "y")
+    drawing.draw_without_rendering()
+    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
+    for along in (axes.xaxis, axes.yaxis):
+        low, high = along.get_view_interval()
+        shown = [label.get_text() for label in along.get_ticklabels()]
+        read = [float(text.replace(",", "").replace("\N{MINUS SIGN}", "-")) for text in shown]
+        assert read == pytest.approx(along.get_ticklocs().tolist())
+        assert sum(low <= number <= high for number in read) >= 2
+        assert all("," in text for text in shown)
+        assert along.get_offset_text().get_text() == ""
+
+
+def test_small_returns_keep_their_decimals():
+    with figure(9, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([0.871, 0.874], [0, 1])
+        show_returns(axes, "x")
+    drawing.draw_without_rendering()
+    shown = [float(label.get_text()) for label in axes.get_xticklabels()]
+    assert shown == pytest.approx(axes.get_xticks().tolist())

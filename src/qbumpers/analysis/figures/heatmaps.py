@@ -74,6 +74,7 @@ def heatmap_figure(counts: pl.DataFrame) -> Figure:
             ScalarMappable(norm, _COLOURS), ax=axes, label="steps per episode", location="bottom",
             shrink=0.5, aspect=40,
         )  # fmt: skip
-        bar.set_ticks(_TICKS, labels=[f"{tick:g}" for tick in _TICKS])
+        least, *between, most = (f"{tick:g}" for tick in _TICKS)
+        bar.set_ticks(_TICKS, labels=[f"≤ {least}", *between, f"≥ {most}"])
         bar.minorticks_off()
     return drawing
