@@ -150,3 +150,29 @@ def test_small_returns_keep_their_decimals():
     drawing.draw_without_rendering()
     shown = [float(label.get_text()) for label in axes.get_xticklabels()]
     assert shown == pytest.approx(axes.get_xticks().tolist())
+
+
+def test_gains_of_millions_beside_losses_of_thousands_are_not_stretched():
+    with figure(4, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([0, 1], [-20_000, 6_000_000])
+        show_returns(axes, "y")
+    assert axes.get_yscale() == "linear"
+
+
+@pytest.mark.parametrize("deepest", [-3e4, -8.4e6, -1e10])
+def test_numbers_of_stretched_axes_do_not_overlap(deepest):
+    with figure(10, 3) as drawing:
+        axes = drawing.subplots(1, 2)[0]
+        axes.plot([0, deepest], [0, 1])
+        show_returns(axes, "x")
+    drawing.draw_without_rendering()
+    low, high = axes.get_xlim()
+    labels = [
+        label.get_window_extent()
+        for label, place in zip(axes.get_xticklabels(), axes.get_xticks(), strict=True)
+        if low <= place <= high
+    ]
+    assert len(labels) >= 3
+    ordered = sorted(labels, key=lambda box: box.x0)
+    assert all(first.x1 < second.x0 for first, second in zip(ordered, ordered[1:], strict=False))

@@ -116,8 +116,7 @@ _FAR, _NEAR = 1000, 100  # beyond the first, what lies nearer to zero could not 
 def show_returns(axes: Axes, axis: Literal["x", "y"]) -> None:
     """Show returns so that they can be read, with numbers written in full.
 
-    Returns from small ones to very large losses are shown linear within -100..100, logarithmic
-    beyond.
+    Small returns beside very large losses are shown linear within -100..100, logarithmic beyond.
 
     Args:
         axes: with everything drawn.
@@ -127,12 +126,13 @@ def show_returns(axes: Axes, axis: Literal["x", "y"]) -> None:
         (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
     )
     low, high = along.get_view_interval()
-    if low >= -_FAR or high < -_NEAR:
+    if low >= -_FAR or not -_NEAR <= high <= _FAR:
         write_in_full(along)
         return
     set_scale("symlog", linthresh=_NEAR, linscale=1.2)
     steps = (1,) if axis == "x" else (1, 3)  # numbers side by side need more room
-    sizes = [step * 10**power for power in range(2, 9) for step in steps]
+    sizes = [step * 10**power for power in range(2, 12) for step in steps]
+    sizes = sizes[:: 1 + sum(size <= -low for size in sizes) // 12]
     ticks = [tick for tick in (*(-s for s in sizes[::-1]), 0, *sizes) if low <= tick <= high]
     along.set_ticks(ticks, [format_number(tick, 0) for tick in ticks])
     along.set_minor_locator(NullLocator())
