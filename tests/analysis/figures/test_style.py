@@ -160,7 +160,7 @@ def test_gains_of_millions_beside_losses_of_thousands_are_not_stretched():
     assert axes.get_yscale() == "linear"
 
 
-@pytest.mark.parametrize("deepest", [-3e4, -8.4e6, -1e10])
+@pytest.mark.parametrize("deepest", [-3e4, -8.4e6, -2e8])
 def test_numbers_of_stretched_axes_do_not_overlap(deepest):
     with figure(10, 3) as drawing:
         axes = drawing.subplots(1, 2)[0]

@@ -60,10 +60,13 @@ _STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "xtick.bottom": False,  # the grid shows where ticks are, and is quicker to draw alone
+    "ytick.left": False,
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.8,
     "axes.axisbelow": True,
     "legend.frameon": False,
+    "text.parse_math": False,  # names of one's own may have dollar signs
     "figure.dpi": 100,
     "savefig.dpi": 150,
     "svg.hashsalt": "qbumpers",
@@ -110,6 +113,7 @@ def setting(condition: str) -> str:
     return options.replace("alpha=", "α = ").replace(",", ", ")
 
 
+_PNG: Any = {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 4}}
 _FAR, _NEAR = 1000, 100  # beyond the first, what lies nearer to zero could not be distinguished
 
 
@@ -126,13 +130,13 @@ def show_returns(axes: Axes, axis: Literal["x", "y"]) -> None:
         (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
     )
     low, high = along.get_view_interval()
-    if low >= -_FAR or not -_NEAR <= high <= _FAR:
+    if low >= -_FAR or not -_NEAR <= high <= -low:
         write_in_full(along)
         return
     set_scale("symlog", linthresh=_NEAR, linscale=1.2)
-    steps = (1,) if axis == "x" else (1, 3)  # numbers side by side need more room
+    steps, most = ((1,), 3) if axis == "x" else ((1, 3), 12)  # side by side they need more space
     sizes = [step * 10**power for power in range(2, 12) for step in steps]
-    sizes = sizes[:: 1 + sum(size <= -low for size in sizes) // 12]
+    sizes = sizes[:: -(-sum(size <= -low for size in sizes) // most)]
     ticks = [tick for tick in (*(-s for s in sizes[::-1]), 0, *sizes) if low <= tick <= high]
     along.set_ticks(ticks, [format_number(tick, 0) for tick in ticks])
     along.set_minor_locator(NullLocator())
@@ -205,7 +209,7 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
             engine.execute(drawing)
         drawing.set_layout_engine("none")
         canvas = FigureCanvasAgg(drawing)
-        write_atomically(pixels, lambda path: canvas.print_png(path, metadata={"Software": None}))
+        write_atomically(pixels, lambda path: canvas.print_png(path, **_PNG))
         outline = FigureCanvasSVG(drawing)
         write_atomically(vector, lambda path: outline.print_svg(path, metadata={"Date": None}))
     return pixels
