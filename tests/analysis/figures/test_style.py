@@ -1,5 +1,6 @@
 """What figures have in common, and how they are saved."""
 
+import itertools
 import re
 from typing import Any
 from xml.etree import ElementTree
@@ -175,4 +176,4 @@ def test_numbers_of_stretched_axes_do_not_overlap(deepest):
     ]
     assert len(labels) >= 3
     ordered = sorted(labels, key=lambda box: box.x0)
-    assert all(first.x1 < second.x0 for first, second in zip(ordered, ordered[1:], strict=False))
+    assert all(first.x1 < second.x0 for first, second in itertools.pairwise(ordered))
