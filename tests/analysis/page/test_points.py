@@ -1,5 +1,7 @@
 """Points that can be read one by one: every condition, where and with the numbers it has."""
 
+from itertools import pairwise
+
 import polars as pl
 import pytest
 
@@ -69,3 +71,16 @@ def test_single_trials_have_no_interval_and_no_probability():
     assert point.numbers[0] == "assisted return 52.0, no interval per episode"
     assert point.numbers[-1] == "not Pareto-optimal"
     assert (point.left, point.top) == (point.x, point.y) == (point.right, point.bottom)
+
+
+@pytest.mark.parametrize("size", [0.0007, 0.07, 7.0, 8.4e6])
+def test_numbers_of_the_axes_stand_at_even_distances(size):
+    scaled = pl.selectors.starts_with("assisted", "unassisted") * size / 100
+    for panel in panels(learner()._replace(frontier=learner().frontier.with_columns(scaled))):
+        for axis in (panel.across, panel.up):
+            places, texts = zip(*axis, strict=True)
+            numbers = [number(text) for text in texts]
+            steps = {round((b - a) / (numbers[1] - numbers[0]), 6) for a, b in pairwise(numbers)}
+            assert steps == {1.0}
+            gaps = [b - a for a, b in pairwise(places)]
+            assert gaps == pytest.approx([gaps[0]] * len(gaps), abs=0.2)

@@ -120,8 +120,9 @@ def _limits(rows: pl.DataFrame, measure: str) -> tuple[float, float]:
 def _ticks(low: float, high: float, place: Any, most: int) -> list[tuple[float, str]]:
     found = np.asarray(MaxNLocator(most).tick_values(low, high))
     values = [value for value in found.tolist() if low <= value <= high]
-    step = min(np.diff(values), default=1.0)
-    digits = max(0, -int(np.floor(np.log10(step) + 1e-9)))
+    # As many decimals as the places have: a rounded number would stand at another's place.
+    exact = (d for d in range(12) if np.allclose(np.round(values, d), values, atol=0, rtol=1e-9))
+    digits = next(exact, 12)
     return [(place(value), format_number(value, digits)) for value in values]
 
 
