@@ -13,7 +13,7 @@ class Page(HTMLParser):
         super().__init__()
         self.open, self.sections, self.nav = [], [], []
         self.pictures, self.links, self.references, self.files = [], [], [], {}
-        self.tables, self.words = {}, []
+        self.tables, self.words, self.subtitles = {}, [], []
         self.feed(text)
         self.close()
         assert self.open == []
@@ -27,6 +27,8 @@ class Page(HTMLParser):
             self.open.append(tag)
         if tag == "h2":
             self.sections.append(values["id"])
+        elif tag == "h3":
+            self.subtitles.append("")
         elif tag == "img":
             self.pictures.append((values["alt"], values["src"]))
         elif tag == "a":
@@ -49,6 +51,8 @@ class Page(HTMLParser):
 
     def handle_data(self, data):
         self.words.append(data)
+        if "h3" in self.open:
+            self.subtitles[-1] += data
         if {"td", "th"} & set(self.open):
             self.tables[self.sections[-1]][-1][-1][-1] += data.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -70,7 +74,9 @@ def content(address):
 
 def number(value, digits=1):
     """A number as reports write it, a dash if there is none."""
-    return "–" if value is None else f"{value:,.{digits}f}".replace("-", "\N{MINUS SIGN}")
+    if value is None:
+        return "–"
+    return f"{round(value, digits):,.{max(0, digits)}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def interval(row, measure, digits=1):

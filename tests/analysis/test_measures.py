@@ -28,7 +28,9 @@ OPTIONS = {
     "tutor/alpha=0.2": {"zeal": 3, "alpha": 0.2, "second": True},
 }
 TRIALS, EPISODES, RETAINED = 4, 25, 3
+RATES = ("override_rate", "override_rate_first", "override_rate_last")
 EVENTS = ("assisted_success", "unassisted_success", "assisted_crash", "unassisted_crash")
+SHARES = (*RATES, *EVENTS, "criterion_reached")
 CRITERION = -220.0
 
 
@@ -182,8 +184,9 @@ def test_a_summary_is_a_macro_average_over_trials_with_an_interval_over_trials()
             error = statistics.stdev(values) / math.sqrt(TRIALS)
             margin = scipy.stats.t.ppf(0.975, TRIALS - 1) * error
             assert row[f"{measure}_mean"] == pytest.approx(mean)
-            assert row[f"{measure}_low"] == pytest.approx(mean - margin)
-            assert row[f"{measure}_high"] == pytest.approx(mean + margin)
+            least, most = (0, 1) if measure in SHARES else (-math.inf, math.inf)
+            assert row[f"{measure}_low"] == pytest.approx(max(least, mean - margin))
+            assert row[f"{measure}_high"] == pytest.approx(min(most, mean + margin))
 
 
 def test_a_summary_says_what_a_condition_is():
@@ -249,7 +252,10 @@ def test_a_curve_is_a_mean_and_interval_over_trials_at_each_episode(column):
         values = [float(value) for value in chosen[column]]
         mean = statistics.fmean(values)
         margin = scipy.stats.t.ppf(0.975, TRIALS - 1) * statistics.stdev(values) / math.sqrt(4)
-        assert found[:, episode] == pytest.approx([mean, mean - margin, mean + margin])
+        ends = [mean - margin, mean + margin]
+        if column == "unassisted_success":  # a share
+            ends = [max(0, ends[0]), min(1, ends[1])]
+        assert found[:, episode] == pytest.approx([mean, *ends])
 
 
 def test_a_curve_of_a_single_trial_has_no_band():

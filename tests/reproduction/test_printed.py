@@ -107,8 +107,9 @@ SUMMARY = pl.DataFrame(
 )
 REDUCTION = IntervalEstimate(0.3, 0.25, 0.35)
 REGRET = Regret(
-    0, "x", "y", 50.0, -500.0, IntervalEstimate(-300.0, -310.0, -290.0), -20.0, REDUCTION
-)
+    0, "x", "y", 50.0, -500.0, IntervalEstimate(-300.0, -310.0, -290.0), -20.0, REDUCTION,
+    IntervalEstimate(480.0, 400.0, 560.0),
+)  # fmt: skip
 
 
 def test_conditions_that_were_run_are_compared_and_no_others():

@@ -8,10 +8,15 @@ import polars as pl
 
 from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.comparisons import RETURNS, against, compare_methods, optimal, pooled
+from qbumpers.analysis.formatting import decimals_of
 from qbumpers.analysis.frontier import Regret, matched_regret
+from qbumpers.analysis.leaders import Leader, Trade, leader, trade
 from qbumpers.analysis.measures import summary, trial_samples
 from qbumpers.experiments.design import Experiment
 from qbumpers.experiments.record import RecordedCondition
+
+_ROLES = ("maximal", "local-q-thresholding", "stochastic-q-bumpers")
+"""Published assistants; of two, the first is the baseline of the other."""
 
 
 class LearnerFindings(NamedTuple):
@@ -30,6 +35,8 @@ class LearnerFindings(NamedTuple):
             rows without a control.
         compared: the method and the baseline of the regrets; None without two swept ones.
         regrets: by what is matched, "performance" and "learning".
+        leaders: the best condition by measure, "assisted" and "unassisted".
+        trade: between the two of them; None if they are one.
     """
 
     learner: str
@@ -42,11 +49,31 @@ class LearnerFindings(NamedTuple):
     differences: pl.DataFrame
     compared: tuple[str, str] | None
     regrets: dict[str, Regret]
+    leaders: Mapping[str, Leader]
+    trade: Trade | None
 
     @property
     def label(self) -> str:
         """What distinguishes the learner from others, for example "perception=observant"."""
         return self.learner.partition("/")[2]
+
+    @property
+    def decimals(self) -> int:
+        """Decimals of its mean returns."""
+        ends = [f"{measure}_{part}" for measure in RETURNS for part in ("mean", "low", "high")]
+        return decimals_of(self.summary.select(ends).to_numpy().astype(float).ravel().tolist())
+
+
+class Sentences(NamedTuple):
+    """Sentences on one kind of learner, or on a whole run.
+
+    Attributes:
+        heading: what distinguishes the learner from others; empty for none.
+        sentences: in plain words.
+    """
+
+    heading: str
+    sentences: Sequence[str]
 
 
 class Findings(NamedTuple):
@@ -57,8 +84,9 @@ class Findings(NamedTuple):
         trials: a row per trial.
         learners: what compares conditions, one for each kind of learner.
         additions: what is added to the report of this experiment.
-        headlines: what came out, in plain sentences; empty until `find` of a report adds them.
+        headlines: what came out; empty until `find` of a report adds it.
         cautions: what to keep in mind, in plain sentences; the same.
+        suggestions: what to try next, in plain sentences; the same.
         missing: how many trials each condition lacks, by id, if the run is not finished.
     """
 
@@ -66,8 +94,9 @@ class Findings(NamedTuple):
     trials: pl.DataFrame
     learners: list[LearnerFindings]
     additions: Additions = Additions()
-    headlines: Sequence[str] = ()
+    headlines: Sequence[Sentences] = ()
     cautions: Sequence[str] = ()
+    suggestions: Sequence[str] = ()
     missing: Mapping[str, int] = {}
 
     @property
@@ -124,6 +153,13 @@ def _about(
         areas = areas.join(means, on="assistant", how="left", maintain_order="left")
     control = _control(table)
     compared = _compared(table)
+    samples = trial_samples(trials, *RETURNS)
+    idle = table.filter(overrides_mean=0)["condition"].to_list()
+    leaders = {
+        measure: leader({name: v[:, place] for name, v in samples.items()}, idle, paired)
+        for place, measure in enumerate(RETURNS)
+    }
+    performing, teaching = (leaders[measure].condition for measure in RETURNS)
     return LearnerFindings(
         learner=str(table["learner"][0]),
         summary=table,
@@ -136,7 +172,9 @@ def _about(
         control=control,
         differences=_differences(trials, control, paired),
         compared=compared,
-        regrets=_regrets(table, trials, compared, generator, paired) if compared else {},
+        regrets=_regrets(table, samples, compared, generator, paired) if compared else {},
+        leaders=leaders,
+        trade=None if performing == teaching else trade(samples, performing, teaching, paired),
     )
 
 
@@ -161,23 +199,31 @@ def _differences(trials: pl.DataFrame, control: str | None, paired: bool) -> pl.
 
 
 def _compared(table: pl.DataFrame) -> tuple[str, str] | None:
-    """The last swept method of an experiment, and the one before it as its baseline."""
+    """The method and the baseline of the regrets: of swept assistants, the two of highest rank.
+
+    What was published ranks below one's own, so that the older of two is the baseline; the order
+    of an experiment's file plays no part.
+    """
     overriding = table.filter(pl.col("overrides_mean") > 0)
-    counts = overriding.group_by("assistant", maintain_order=True).len()
-    swept = counts.filter(pl.col("len") > 1)["assistant"].to_list()
+    counts = overriding.group_by("assistant").len()
+    swept = sorted(counts.filter(pl.col("len") > 1)["assistant"].to_list(), key=_rank)
     return (swept[-1], swept[-2]) if len(swept) > 1 else None
+
+
+def _rank(assistant: str) -> tuple[int, str]:
+    known = _ROLES.index(assistant) if assistant in _ROLES else len(_ROLES)
+    return known, assistant
 
 
 def _regrets(
     table: pl.DataFrame,
-    trials: pl.DataFrame,
+    samples: Mapping[str, np.ndarray],
     compared: tuple[str, str],
     generator: Callable[[int], np.random.Generator],
     paired: bool,
 ) -> dict[str, Regret]:
     overriding = table.filter(pl.col("overrides_mean") > 0)
     ours, theirs = (overriding.filter(assistant=name)["condition"].to_list() for name in compared)
-    samples = trial_samples(trials, *RETURNS)
     return {
         matched: matched_regret(samples, ours, theirs, axis, generator(4 + axis), paired)
         for axis, matched in enumerate(("performance", "learning"))

@@ -155,6 +155,7 @@ class Regret(NamedTuple):
         method: what the method reaches there.
         best: the best possible, from which regret is counted.
         reduction: 1 - (best - method) / (best - baseline).
+        gap: best - baseline, the baseline's own regret, of which the reduction is a share.
     """
 
     axis: int
@@ -165,6 +166,15 @@ class Regret(NamedTuple):
     method: IntervalEstimate
     best: float
     reduction: IntervalEstimate
+    gap: IntervalEstimate
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the baseline's regret is surely above zero: no share of less means anything.
+
+        Even the lower end of its interval must be a quarter of it.
+        """
+        return self.gap.low > self.gap.mean / 4 > 0
 
 
 def matched_regret(
@@ -203,14 +213,19 @@ def matched_regret(
         """The method's other measure, [...], at the baseline's level; points are [..., C, 2]."""
         return at_matched(points[..., ours, :], _standing(points, theirs, axis)[..., axis], axis)
 
+    def regret(points: np.ndarray) -> np.ndarray:
+        """The baseline's regret, [...]."""
+        best = points[..., 1 - axis].max(axis=-1)
+        return best - _standing(points, theirs, axis)[..., 1 - axis]
+
     def reduction(points: np.ndarray) -> np.ndarray:
         """The share of the baseline's regret that the method is without; NaN if there is none."""
-        best = points[..., 1 - axis].max(axis=-1)
-        gap = best - _standing(points, theirs, axis)[..., 1 - axis]
+        best, gap = points[..., 1 - axis].max(axis=-1), regret(points)
         return 1 - (best - reached(points)) / np.where(gap > 0, gap, np.nan)
 
     chosen = theirs[int(np.argmax(means[theirs, 1 - axis]))]
     best = int(np.argmax(means[:, 1 - axis]))
+    share = function_interval(reduction, means, resampled)
     return Regret(
         axis=axis,
         baseline_condition=names[chosen],
@@ -219,7 +234,9 @@ def matched_regret(
         baseline=float(means[chosen, 1 - axis]),
         method=function_interval(reached, means, resampled),
         best=float(means[best, 1 - axis]),
-        reduction=function_interval(reduction, means, resampled),
+        # All of the regret is the most that can be avoided. NaN stays.
+        reduction=share._replace(high=float(np.minimum(share.high, 1.0))),
+        gap=function_interval(regret, means, resampled),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from qbumpers.analysis.statistics import mean_interval
+from qbumpers.analysis.statistics import UNKNOWN, IntervalEstimate, mean_interval
 
 MEASURES = {
     "assisted": "return of the assisted episodes, mean over the training, reward units",
@@ -30,6 +30,12 @@ MEASURES = {
     "criterion_reached": "share of the trials that reach the criterion",
 }
 """Measures of a trial, in the order of tables: what each is, and its unit."""
+
+SHARES = (
+    "override_rate", "override_rate_first", "override_rate_last", "assisted_success",
+    "unassisted_success", "assisted_crash", "unassisted_crash", "criterion_reached",
+)  # fmt: skip
+"""Those of the measures that lie within [0, 1], and so do their intervals."""
 
 CRITERION_RUN = 5
 """Successive unassisted episodes that must reach the criterion."""
@@ -191,10 +197,12 @@ def summary(
 
 def _columns(measure: str, values: np.ndarray) -> dict[str, float | None]:
     """The three columns of a measure; null if unknown."""
-    numbers = mean_interval(values)._asdict() if len(values) else {}
+    numbers = np.array(mean_interval(values) if len(values) else UNKNOWN)
+    if measure in SHARES:
+        numbers = np.clip(numbers, 0, 1)
     return {
-        f"{measure}_{part}": None if np.isnan(numbers.get(part, np.nan)) else numbers[part]
-        for part in ("mean", "low", "high")
+        f"{measure}_{part}": None if np.isnan(number) else float(number)
+        for part, number in zip(IntervalEstimate._fields, numbers, strict=True)
     }
 
 
@@ -211,10 +219,11 @@ def learning_curve(
             a block if None.
 
     Returns:
-        float64 [3, B]: mean, low, high.
+        float64 [3, B]: mean, low, high; within [0, 1] if the measure is a share.
     """
     values = _by_trial(episodes, condition, column)
-    return _course(_block_sums(values, starts) / _block_sums(np.ones_like(values), starts))
+    found = _course(_block_sums(values, starts) / _block_sums(np.ones_like(values), starts))
+    return np.clip(found, 0, 1) if column in SHARES else found
 
 
 def override_curve(
@@ -235,7 +244,7 @@ def override_curve(
         _block_sums(_by_trial(training, condition, column), starts)
         for column in ("overrides", "assisted_length")
     )
-    return _course(overrides / steps)
+    return np.clip(_course(overrides / steps), 0, 1)
 
 
 def _by_trial(episodes: pl.DataFrame, condition: str, column: str) -> np.ndarray:

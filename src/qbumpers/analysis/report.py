@@ -1,7 +1,9 @@
 """Tables, figures and one self-contained page, from the files of a finished run alone."""
 
+import contextlib
+import gc
 import io
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,13 @@ from qbumpers.analysis.figures.style import save
 from qbumpers.analysis.findings import Findings, LearnerFindings, find_tables
 from qbumpers.analysis.frontier import Regret
 from qbumpers.analysis.measures import trial_measures
+from qbumpers.analysis.page.cautions import cautions
+from qbumpers.analysis.page.doubts import doubts
 from qbumpers.analysis.page.drawings import drawings
 from qbumpers.analysis.page.elements import Drawing
-from qbumpers.analysis.page.headlines import cautions, headlines
+from qbumpers.analysis.page.headlines import headlines
 from qbumpers.analysis.page.layout import Picture, page
+from qbumpers.analysis.page.suggestions import suggestions
 from qbumpers.experiments.store import Results, load
 from qbumpers.files import clear_left, write_atomically
 
@@ -98,7 +103,11 @@ def find(results: Results, add: Add = nothing) -> Findings:
     found = find_tables(trials, results.experiment, results.conditions)
     found = found._replace(missing=results.missing)
     found = found._replace(additions=add(results, found))
-    return found._replace(headlines=headlines(found), cautions=cautions(found, results.experiment))
+    return found._replace(
+        headlines=headlines(found),
+        cautions=[*doubts(found, results), *cautions(found, results.experiment)],
+        suggestions=suggestions(found),
+    )
 
 
 def _tables(findings: Findings) -> dict[str, pl.DataFrame]:
@@ -137,7 +146,11 @@ def _flat(about: LearnerFindings, matched: str, regret: Regret) -> dict[str, Any
         "baseline": regret.baseline,
         "best": regret.best,
         **{f"method_{part}": number for part, number in regret.method._asdict().items()},
-        **{f"reduction_{part}": number for part, number in regret.reduction._asdict().items()},
+        **{
+            f"reduction_{part}": number if regret.is_known else float("nan")
+            for part, number in regret.reduction._asdict().items()
+        },
+        **{f"gap_{part}": number for part, number in regret.gap._asdict().items()},
     }
 
 
@@ -145,8 +158,21 @@ def _picture(folder: Path, drawing: Drawing) -> Picture:
     """Draw a figure and write it, with the numbers behind it."""
     numbers = drawing.numbers.with_columns(pl.selectors.float().round_sig_figs(8)).write_csv()
     _write(folder / f"{drawing.name}.csv", numbers.encode())
-    image = save(drawing.draw(), folder, drawing.name).read_bytes()
+    with _without_collection():
+        image = save(drawing.draw(), folder, drawing.name).read_bytes()
     return Picture(drawing.kind, drawing.label, drawing.name, drawing.caption, image, numbers)
+
+
+@contextlib.contextmanager
+def _without_collection() -> Iterator[None]:
+    """Without garbage collection: a figure makes so many objects that it takes a tenth longer."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def _parquet(table: pl.DataFrame) -> bytes:

@@ -31,6 +31,10 @@ class IntervalEstimate(NamedTuple):
     high: float
 
 
+UNKNOWN = IntervalEstimate(float("nan"), float("nan"), float("nan"))
+"""Neither a number nor an interval."""
+
+
 class Difference(NamedTuple):
     """How much larger one mean is than another.
 

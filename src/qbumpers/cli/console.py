@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from qbumpers.analysis.formatting import decimals_for
+from qbumpers.analysis.formatting import decimals_for, format_number
 
 OUTPUT, ERRORS = Console(highlight=False), Console(stderr=True, highlight=False)
 
@@ -79,8 +79,13 @@ def interval(mean: float | None, low: float | None, high: float | None, digits: 
         return "-"
     digits = decimals_for(low, high, digits)
     if low is None or high is None or not math.isfinite(low):
-        return f"{mean:.{digits}f}"
-    return f"{mean:.{digits}f} \N{PLUS-MINUS SIGN} {(high - low) / 2:.{digits}f}"
+        return _number(mean, digits)
+    return f"{_number(mean, digits)} \N{PLUS-MINUS SIGN} {_number((high - low) / 2, digits)}"
+
+
+def _number(value: float, digits: int) -> str:
+    """With the minus sign of a keyboard, and separators only if it has no decimals."""
+    return f"{value:.{digits}f}" if digits > 0 else typeable(format_number(value, digits))
 
 
 def duration(seconds: float) -> str:

@@ -23,6 +23,7 @@ from qbumpers.errors import RequestError, counted
 if TYPE_CHECKING:
     import polars as pl
 
+    from qbumpers.analysis.findings import LearnerFindings
     from qbumpers.experiments.design import Experiment
     from qbumpers.experiments.run import RunProgress
 
@@ -235,18 +236,25 @@ def _analyse(folder: str) -> None:
 
         with local_copy(folder, files_to_read(folder)) as place:
             findings = write_report(place, advance=lambda part: status.update(f"writing {part}"))
-    for learner, rows in findings.summary.group_by("learner", maintain_order=True):
-        OUTPUT.print(_summary_table(str(learner[0]), rows))
+    for about in findings.learners:
+        OUTPUT.print(_summary_table(about))
     if PUBLISHED in findings.additions.tables:
         OUTPUT.print(_published_table(findings.additions.tables[PUBLISHED]))
-    for sentence in (*findings.headlines, *findings.cautions):
-        OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
+    for heading, sentences in (
+        *findings.headlines,
+        ("What to try next", findings.suggestions),
+        ("Keep in mind", findings.cautions),
+    ):
+        if heading and sentences:
+            OUTPUT.print(f"{escape(heading)}:", soft_wrap=True)
+        for sentence in sentences:
+            OUTPUT.print(f"- {escape(typeable(sentence))}", soft_wrap=True)
     OUTPUT.print(f"Report: [bold]{escape(folder)}/{REPORT}[/bold]", soft_wrap=True)
 
 
-def _summary_table(learner: str, summary: "pl.DataFrame") -> Table:
+def _summary_table(about: "LearnerFindings") -> Table:
     """Returns and overrides of the conditions of one kind of learner."""
-    own = learner.partition("/")[2]
+    own, summary = about.label, about.summary
     listing = table("condition", "assisted", "unassisted", "overrides")
     for column in listing.columns:
         column.no_wrap = column.header != "condition"  # the narrow give way last
@@ -254,12 +262,12 @@ def _summary_table(learner: str, summary: "pl.DataFrame") -> Table:
         listing.title, listing.title_justify = f"Learners with {own}", "left"
     for row in summary.iter_rows(named=True):
         cells = [
-            interval(row[f"{measure}_mean"], row[f"{measure}_low"], row[f"{measure}_high"])
-            for measure in ("assisted", "unassisted")
+            interval(row[f"{m}_mean"], row[f"{m}_low"], row[f"{m}_high"], about.decimals)
+            for m in ("assisted", "unassisted")
         ]
         condition = row["condition"].removesuffix(f"@{own}")
         listing.add_row(condition, *cells, f"{row['overrides_mean']:.2f}")
-    what = "Mean assisted and unassisted returns, and overrides per episode"
+    what = "Mean assisted and unassisted returns per episode, and overrides per episode"
     single = summary["trials"].max() == 1
     listing.caption = (
         f"{what}; one trial per condition has no interval."

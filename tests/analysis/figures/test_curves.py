@@ -45,7 +45,7 @@ def test_every_condition_is_a_line_with_a_band_in_both_panels():
         "Unassisted",
     ]
     for axes, column in zip(drawing.axes, ("assisted_return", "unassisted_return"), strict=True):
-        assert (axes.get_xlabel(), axes.get_ylabel()) == ("episode", "return")
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("episode", "return per episode")
         assert len(axes.lines) == len(axes.collections) == 3
         for line, condition in zip(axes.lines, CHOSEN, strict=True):
             assert xs(line).tolist() == [1, 2, 3, 4, 5, 6]

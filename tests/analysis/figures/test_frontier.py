@@ -17,7 +17,7 @@ from tests.analysis.examples import (
 
 CLOSE = {f"local-q-thresholding/alpha=0.01{digit}": 0.01 + digit / 1000 for digit in range(10)}
 EVERYTHING = {"none": None, "maximal": None, **CLOSE, **BUMPERS}
-AXES = ("mean assisted return", "mean unassisted return")
+AXES = ("mean assisted return per episode", "mean unassisted return per episode")
 LABELS = {
     "none": "No assistance",
     "maximal": "Maximal assistance",

@@ -1,5 +1,6 @@
 """What figures have in common, and how they are saved."""
 
+import itertools
 import re
 from typing import Any
 from xml.etree import ElementTree
@@ -16,7 +17,7 @@ from qbumpers.analysis.figures.style import (
     readable,
     save,
     setting,
-    stretch,
+    show_returns,
 )
 from tests.narrowing import present
 
@@ -117,8 +118,62 @@ def test_only_returns_of_very_different_size_are_stretched(axis):
             axes = drawing.subplots()
             axes.plot([0, deepest], [0, deepest])
             axes.margins(0)
-            stretch(axes, axis)
+            show_returns(axes, axis)
         assert {"x": axes.get_xscale(), "y": axes.get_yscale()}[axis] == scale
     along = axes.xaxis if axis == "x" else axes.yaxis
     for place, label in zip(along.get_ticklocs(), along.get_ticklabels(), strict=True):
         assert float(label.get_text().replace(",", "").replace("\N{MINUS SIGN}", "-")) == place
+
+
+def test_returns_of_millions_are_written_in_full_and_not_stretched():
+    with figure(9, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([8.0e6, 8.4e6], [-8.4e6, -8.0e6])
+        show_returns(axes, "x")
+        show_returns(axes, "y")
+    drawing.draw_without_rendering()
+    assert (axes.get_xscale(), axes.get_yscale()) == ("linear", "linear")
+    for along in (axes.xaxis, axes.yaxis):
+        low, high = along.get_view_interval()
+        shown = [label.get_text() for label in along.get_ticklabels()]
+        read = [float(text.replace(",", "").replace("\N{MINUS SIGN}", "-")) for text in shown]
+        assert read == pytest.approx(along.get_ticklocs().tolist())
+        assert sum(low <= number <= high for number in read) >= 2
+        assert all("," in text for text in shown)
+        assert along.get_offset_text().get_text() == ""
+
+
+def test_small_returns_keep_their_decimals():
+    with figure(9, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([0.871, 0.874], [0, 1])
+        show_returns(axes, "x")
+    drawing.draw_without_rendering()
+    shown = [float(label.get_text()) for label in axes.get_xticklabels()]
+    assert shown == pytest.approx(axes.get_xticks().tolist())
+
+
+def test_gains_of_millions_beside_losses_of_thousands_are_not_stretched():
+    with figure(4, 3) as drawing:
+        axes = drawing.subplots()
+        axes.plot([0, 1], [-20_000, 6_000_000])
+        show_returns(axes, "y")
+    assert axes.get_yscale() == "linear"
+
+
+@pytest.mark.parametrize("deepest", [-3e4, -8.4e6, -2e8])
+def test_numbers_of_stretched_axes_do_not_overlap(deepest):
+    with figure(10, 3) as drawing:
+        axes = drawing.subplots(1, 2)[0]
+        axes.plot([0, deepest], [0, 1])
+        show_returns(axes, "x")
+    drawing.draw_without_rendering()
+    low, high = axes.get_xlim()
+    labels = [
+        label.get_window_extent()
+        for label, place in zip(axes.get_xticklabels(), axes.get_xticks(), strict=True)
+        if low <= place <= high
+    ]
+    assert len(labels) >= 3
+    ordered = sorted(labels, key=lambda box: box.x0)
+    assert all(first.x1 < second.x0 for first, second in itertools.pairwise(ordered))

@@ -14,7 +14,7 @@ from qbumpers.analysis.figures.style import (
     assistant_of,
     figure,
     readable,
-    stretch,
+    show_returns,
 )
 from qbumpers.analysis.measures import learning_curve, override_curve
 
@@ -22,7 +22,7 @@ MOST_POINTS = 100
 """Curves of longer trainings are of means over blocks of episodes, so many or fewer."""
 
 _UNITS = {
-    "return": "return",
+    "return": "return per episode",
     "success": "episodes that succeed, per cent",
     "crash": "episodes that crash, per cent",
 }
@@ -147,7 +147,7 @@ def curves_figure(
         for axes, (side, title) in zip(drawing.subplots(1, 2), _PANELS.items(), strict=True):
             if measure == "return":
                 _draw(axes, curves, f"{side}_return", drawn)
-                stretch(axes, "y")
+                show_returns(axes, "y")
             else:
                 _draw(axes, _percentages(curves, f"{side}_{measure}"), f"{side}_{measure}", drawn)
                 axes.set(ylim=(-4, 104))
@@ -175,13 +175,14 @@ def courses_figure(courses: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
         axes = drawing.subplots()
         _draw(axes, _percentages(courses, "override_rate"), "override_rate", drawn)
         axes.set(xlabel="episode", ylabel="steps overridden, per cent")
-        axes.set_ylim(bottom=-0.04 * axes.get_ylim()[1])  # intervals of rates may end below zero
+        axes.set_ylim(bottom=-0.02 * axes.get_ylim()[1])
         _legend(drawing)
     return drawing
 
 
 def _percentages(curves: pl.DataFrame, column: str) -> pl.DataFrame:
-    return curves.with_columns(pl.selectors.starts_with(column) * 100)
+    """Shares as percentages; what a band claims below 0 or above 100 is left out."""
+    return curves.with_columns((pl.selectors.starts_with(column) * 100).clip(0, 100))
 
 
 def _draw(axes: Axes, curves: pl.DataFrame, column: str, drawn: Mapping[str, Look]) -> None:

@@ -10,9 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from qbumpers.analysis.figures.labels import MOST_IN_A_COLUMN, label_in_column, room_for_labels
-from qbumpers.analysis.figures.style import NAMES, Look, figure, setting
+from qbumpers.analysis.figures.style import NAMES, Look, figure, setting, write_in_full
 
-_AXES = {"xlabel": "mean assisted return", "ylabel": "mean unassisted return"}
+_AXES = {
+    "xlabel": "mean assisted return per episode",
+    "ylabel": "mean unassisted return per episode",
+}
 _MAIN_SIZE = np.array([9.0, 4.6])  # of the main panel, in inches, about
 _CLUSTER = 3  # so many labels without room make a cluster, which is enlarged
 _RING: Any = {"marker": "o", "markerfacecolor": "none", "color": "#222222"}
@@ -143,6 +146,7 @@ def _draw(axes: Axes, rows: pl.DataFrame, content: _Content, size: float) -> Non
         scaley=False,
     )  # fmt: skip
     axes.set(**_AXES)
+    write_in_full(axes.xaxis, axes.yaxis)
 
 
 def _marked(rows: pl.DataFrame, content: _Content) -> list[tuple[tuple[float, float], str]]:

@@ -8,6 +8,7 @@ import polars as pl
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from qbumpers.analysis.figures.style import figure, readable
 
@@ -60,20 +61,24 @@ def heatmap_figure(counts: pl.DataFrame) -> Figure:
         axes = drawing.subplots()
         for place, panel in np.ndindex(len(conditions), len(_PANELS)):
             left, low = panel * across, (place + 1) * down
-            axes.imshow(
-                np.ma.masked_equal(maps[place, :, :, panel], 0), norm=norm, cmap=_COLOURS,
+            # Not by `imshow`, which scales the axes anew for each.
+            image = AxesImage(
+                axes, cmap=_COLOURS, norm=norm, origin="upper",
                 extent=(left, left + columns, low, low - rows),
             )  # fmt: skip
+            image.set_data(np.ma.masked_equal(maps[place, :, :, panel], 0))
+            axes.add_image(image)
             axes.text(left, low - rows - 0.07 * inch, list(_PANELS.values())[panel], fontsize=9)
             if panel == 0:
                 name = readable(conditions[place])
                 axes.text(left, low - rows - 0.26 * inch, name, fontsize=9, weight="bold")
-        axes.set(xlim=(0, across * len(_PANELS)), ylim=(len(conditions) * down, 0))
+        axes.set(aspect="equal", xlim=(0, across * len(_PANELS)), ylim=(len(conditions) * down, 0))
         axes.set_axis_off()
         bar = drawing.colorbar(
             ScalarMappable(norm, _COLOURS), ax=axes, label="steps per episode", location="bottom",
             shrink=0.5, aspect=40,
         )  # fmt: skip
-        bar.set_ticks(_TICKS, labels=[f"{tick:g}" for tick in _TICKS])
+        least, *between, most = (f"{tick:g}" for tick in _TICKS)
+        bar.set_ticks(_TICKS, labels=[f"≤ {least}", *between, f"≥ {most}"])
         bar.minorticks_off()
     return drawing

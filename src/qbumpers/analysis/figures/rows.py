@@ -7,7 +7,7 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable, stretch
+from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable, show_returns
 
 MOST_ROWS = 60
 """More conditions than these are too many for a figure."""
@@ -63,7 +63,7 @@ def spreads_figure(spread: pl.DataFrame, trials: pl.DataFrame, drawn: Mapping[st
             rows = spread.filter(measure=measure)
             places = rows.select("low", "quarter", "median", "three_quarters", "high")
             _draw_rows(axes, conditions, places.cast(pl.Float64).to_numpy(), drawn)
-            axes.set(xlabel=f"mean {measure} return of a trial")
+            axes.set(xlabel=f"mean {measure} return per episode")
     return drawing
 
 
@@ -87,7 +87,7 @@ def differences_figure(differences: pl.DataFrame, drawn: Mapping[str, Look]) -> 
                     "simultaneous_high")  # fmt: skip
             axes.axvline(0, color="#555555", linewidth=1)
             _draw_rows(axes, conditions, rows.select(ends).cast(pl.Float64).to_numpy(), drawn)
-            axes.set(xlabel=f"difference of mean {measure} returns")
+            axes.set(xlabel=f"difference in mean {measure} return per episode")
     return drawing
 
 
@@ -115,7 +115,7 @@ def _draw_rows(
         )  # fmt: skip
     axes.set_yticks(range(len(conditions)), [readable(c) for c in conditions], fontsize=8)
     axes.set_ylim(len(conditions) - 0.4, -0.6)
-    stretch(axes, "x")
+    show_returns(axes, "x")
 
 
 def _draw_dots(

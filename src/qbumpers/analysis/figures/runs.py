@@ -8,11 +8,14 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable, stretch
+from qbumpers.analysis.figures.style import Look, assistant_of, figure, readable, show_returns
 from qbumpers.analysis.measures import trial_samples
 from qbumpers.analysis.statistics import mean_interval
 
-_PANELS = {"assisted": "mean assisted return", "unassisted": "mean unassisted return"}
+_PANELS = {
+    "assisted": "mean assisted return per episode",
+    "unassisted": "mean unassisted return per episode",
+}
 _MEASURES = (*_PANELS, "assisted_success", "unassisted_success")
 _FILLS = ("full", "none", "left", "bottom")
 _SPREAD = 0.7  # of the height of a run, over which its conditions are drawn
@@ -64,7 +67,7 @@ def runs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure:
             axes.set_yticks(range(len(runs)), runs)
             axes.set(ylim=(len(runs) - 0.5, -0.5), xlabel=title)
             axes.grid(visible=False, axis="y")
-            stretch(axes, "x")
+            show_returns(axes, "x")
         handles, labels = panels[0].get_legend_handles_labels()
         drawing.legend(handles, labels, loc="outside upper left", ncols=4)
     return drawing

@@ -7,11 +7,11 @@ import polars as pl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from qbumpers.analysis.figures.style import DASHES, NAMES, Look, figure
+from qbumpers.analysis.figures.style import DASHES, NAMES, Look, figure, write_in_full
 
 _PANELS = {
-    "assisted": "assisted return",
-    "unassisted": "unassisted return",
+    "assisted": "assisted return per episode",
+    "unassisted": "unassisted return per episode",
     "override_rate": "steps overridden, per cent",
 }
 _PARTS = ("mean", "low", "high")
@@ -73,6 +73,7 @@ def sensitivity_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figu
                 places = _place(axes, np.unique(group["value"].to_numpy()))
                 axes.set(xlabel="α" if option == "alpha" else option, ylabel=title)
                 _draw(axes, lines, measure, places, drawn[name])
+                write_in_full(axes.yaxis)
             row[0].set_title(NAMES.get(name, name))
             if len(lines) > 1:
                 row[-1].legend(fontsize=7)

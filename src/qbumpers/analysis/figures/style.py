@@ -7,12 +7,15 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
 
+from qbumpers.analysis.formatting import format_number
 from qbumpers.files import write_atomically
 
 NAMES = {
@@ -57,10 +60,13 @@ _STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
+    "xtick.bottom": False,  # the grid shows where ticks are, and is quicker to draw alone
+    "ytick.left": False,
     "grid.color": "#e4e4e4",
     "grid.linewidth": 0.8,
     "axes.axisbelow": True,
     "legend.frameon": False,
+    "text.parse_math": False,  # names of one's own may have dollar signs
     "figure.dpi": 100,
     "savefig.dpi": 150,
     "svg.hashsalt": "qbumpers",
@@ -107,28 +113,56 @@ def setting(condition: str) -> str:
     return options.replace("alpha=", "α = ").replace(",", ", ")
 
 
-_FAR = 1000  # beyond it what lies near zero could not be distinguished
+_PNG: Any = {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 4}}
+_FAR, _NEAR = 1000, 100  # beyond the first, what lies nearer to zero could not be distinguished
 
 
-def stretch(axes: Axes, axis: Literal["x", "y"]) -> None:
-    """Show returns of very different size: linear within -100..100, logarithmic beyond.
+def show_returns(axes: Axes, axis: Literal["x", "y"]) -> None:
+    """Show returns so that they can be read, with numbers written in full.
+
+    Small returns beside very large losses are shown linear within -100..100, logarithmic beyond.
 
     Args:
-        axes: with everything drawn; left as they are if all returns are small.
+        axes: with everything drawn.
         axis: which one.
     """
     along, set_scale = (
         (axes.xaxis, axes.set_xscale) if axis == "x" else (axes.yaxis, axes.set_yscale)
     )
     low, high = along.get_view_interval()
-    if low >= -_FAR and high <= _FAR:
+    if low >= -_FAR or not -_NEAR <= high <= -low:
+        write_in_full(along)
         return
-    set_scale("symlog", linthresh=100, linscale=1.2)
-    steps = (1,) if axis == "x" else (1, 3)  # numbers side by side need more room
-    sizes = [step * 10**power for power in range(2, 9) for step in steps]
+    set_scale("symlog", linthresh=_NEAR, linscale=1.2)
+    steps, most = ((1,), 3) if axis == "x" else ((1, 3), 12)  # side by side they need more space
+    sizes = [step * 10**power for power in range(2, 12) for step in steps]
+    sizes = sizes[:: -(-sum(size <= -low for size in sizes) // most)]
     ticks = [tick for tick in (*(-s for s in sizes[::-1]), 0, *sizes) if low <= tick <= high]
-    along.set_ticks(ticks, [f"{tick:,}".replace("-", "\N{MINUS SIGN}") for tick in ticks])
+    along.set_ticks(ticks, [format_number(tick, 0) for tick in ticks])
     along.set_minor_locator(NullLocator())
+
+
+class _InFull(ScalarFormatter):
+    """Numbers without offset or powers of ten, with separators if they are long."""
+
+    def __init__(self) -> None:
+        super().__init__(useOffset=False)
+        self.set_scientific(b=False)
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        whole, point, rest = str(super().__call__(x, pos)).partition(".")
+        return (format_number(x, 0) if abs(x) >= _LONG and not point else whole) + point + rest
+
+
+_LONG = 10_000
+
+
+def write_in_full(*axes: Axis) -> None:
+    """Write the numbers of linear axes in full; fewer of them if they are long."""
+    for along in axes:
+        along.set_major_formatter(_InFull())
+        if np.abs(along.get_view_interval()).max() >= _LONG:
+            along.set_major_locator(MaxNLocator(4))
 
 
 @contextmanager
@@ -168,12 +202,14 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     """
     vector, pixels = (folder / f"{name}.{ending}" for ending in ("svg", "png"))
     with _style():
-        # Once for both, and not by `savefig`, which would draw everything twice for each.
+        # Laid out once for both; `savefig` would lay out and draw everything twice for each.
         drawing.dpi = _STYLE["savefig.dpi"]
-        drawing.draw_without_rendering()
+        engine = drawing.get_layout_engine()
+        if engine is not None:
+            engine.execute(drawing)
         drawing.set_layout_engine("none")
         canvas = FigureCanvasAgg(drawing)
-        write_atomically(pixels, lambda path: canvas.print_png(path, metadata={"Software": None}))
+        write_atomically(pixels, lambda path: canvas.print_png(path, **_PNG))
         outline = FigureCanvasSVG(drawing)
         write_atomically(vector, lambda path: outline.print_svg(path, metadata={"Date": None}))
     return pixels

@@ -10,10 +10,10 @@ from matplotlib.patheffects import withStroke
 
 from qbumpers.analysis.figures.frontier import draw_points
 from qbumpers.analysis.figures.labels import room_for_labels
-from qbumpers.analysis.figures.style import Look, figure, stretch
+from qbumpers.analysis.figures.style import Look, figure, show_returns
 
 PANELS = {
-    ("assisted", "unassisted"): "Return (better ↗)",
+    ("assisted", "unassisted"): "Return per episode (better ↗)",
     ("assisted_success", "unassisted_success"): "Success rate, per cent (better ↗)",
     ("assisted_crash", "unassisted_crash"): "Crash rate, per cent (better ↙)",
 }
@@ -66,8 +66,8 @@ def tradeoffs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure
                 rows = numbers.with_columns(pl.selectors.starts_with(*pair) * 100)
             draw_points(axes, rows, drawn, 5, pair, line="-")
             if pair == ("assisted", "unassisted"):
-                stretch(axes, "x")
-                stretch(axes, "y")
+                show_returns(axes, "x")
+                show_returns(axes, "y")
             else:
                 _within(axes)
             axes.set(title=title, xlabel="assisted", ylabel="unassisted")
@@ -82,7 +82,7 @@ def tradeoffs_figure(numbers: pl.DataFrame, drawn: Mapping[str, Look]) -> Figure
 
 
 def _within(axes: Axes) -> None:
-    """Limits that leave out what intervals of rates claim below 0 and above 100 per cent."""
+    """Limits that go hardly beyond 0 and 100 per cent, whatever margins there are."""
     for limits, narrow in ((axes.get_xlim(), axes.set_xlim), (axes.get_ylim(), axes.set_ylim)):
         narrow(max(limits[0], -4), min(limits[1], 104))
 

@@ -56,7 +56,8 @@ def _of_learner(
     yield make(
         "frontier",
         "Mean unassisted return against mean assisted return, over all episodes of a trial; bars "
-        "are 95% intervals. Ringed conditions are Pareto-optimal; crowded ones are enlarged below.",
+        "are 95% intervals. Ringed conditions are Pareto-optimal; crowded ones, if any, have a "
+        "panel of their own.",
         about.frontier,
         partial(frontier.frontier_figure, drawn=drawn, marks=added.marks),
     )

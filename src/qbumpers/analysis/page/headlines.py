@@ -1,114 +1,194 @@
 """What came out of an experiment, and what to keep in mind, in plain sentences."""
 
-from collections.abc import Iterator, Mapping
-from math import isnan
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite, isnan
 from typing import Any
 
 import polars as pl
 
 from qbumpers.analysis.figures.style import NAMES, readable, setting
-from qbumpers.analysis.findings import Findings, LearnerFindings
-from qbumpers.analysis.formatting import decimals_for, format_number, format_share
+from qbumpers.analysis.findings import Findings, LearnerFindings, Sentences
+from qbumpers.analysis.formatting import decimals_for, decimals_of, format_number, format_share
 from qbumpers.analysis.frontier import Regret
-from qbumpers.experiments.design import Experiment
+from qbumpers.analysis.leaders import Leader, Trade
+from qbumpers.analysis.statistics import IntervalEstimate
 
-FEW_TRIALS, MOST_NAMED = 20, 6
-"""With fewer trials, intervals are rough; conditions that a sentence names."""
+MOST_NAMED = 3
+"""Conditions that a sentence names."""
+
+_EPISODES = {"assisted": "assisted", "unassisted": "greedy unassisted"}
+_VERBS = {"assisted": "performs", "unassisted": "teaches"}
 
 
-def headlines(findings: Findings) -> list[str]:
+def headlines(findings: Findings) -> list[Sentences]:
     """What came out, the most important first.
 
     Args:
         findings: what the tables say about a run.
 
     Returns:
-        Sentences; those on one of several learners begin with what distinguishes it.
+        What is added, then what there is to say about each kind of learner.
     """
+    added = findings.additions.headlines
     return [
-        *findings.additions.headlines,
-        *(
-            f"With {about.label}: {sentence}" if about.label else sentence
-            for about in findings.learners
-            for sentence in _about(about)
-        ),
+        *([Sentences("", added)] if added else []),
+        *(Sentences(about.label, list(_about(about))) for about in findings.learners),
     ]
 
 
 def _about(about: LearnerFindings) -> Iterator[str]:
+    if about.summary.height > 1:
+        for measure, leader in about.leaders.items():
+            yield _leads(about, measure, leader)
+        yield _traded(about)
     for matched, regret in about.regrets.items():
-        yield _regret(matched, regret, *(about.compared or ("", "")))
+        yield _regret(about, matched, regret)
     if about.methods.height > 1 and about.summary["trials"].to_numpy().min() > 1:
         yield from _largest(about.methods)
     for part in about.summary.partition_by("assistant", maintain_order=True):
-        yield _best_settings(_overriding(part))
+        rows = overriding(part)
+        if rows.height > 1 or about.summary.height == 1:
+            yield _best_settings(rows, about.decimals)
     if about.control and about.differences["simultaneous_low"].null_count() == 0:
         yield _against_control(about.differences)
 
 
-def _overriding(rows: pl.DataFrame) -> pl.DataFrame:
+def _leads(about: LearnerFindings, measure: str, leader: Leader) -> str:
+    """Which condition is best in a measure, and how sure that is."""
+    row = about.summary.row(by_predicate=pl.col("condition") == leader.condition, named=True)
+    idle = row["overrides_mean"] == 0 and row["assistant"] != "none"
+    which = ", which never overrode," * idle
+    return (
+        f"{readable(leader.condition)}{which} {_VERBS[measure]} best: its learners return "
+        f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode. "
+        f"{_how_sure(leader, 'condition that overrides' if idle else 'other condition')}"
+    )
+
+
+def _how_sure(leader: Leader, other: str) -> str:
+    others = leader.others
+    if leader.contenders is None:
+        return "Single learners leave it open how sure that is."
+    learners = f"with {leader.trials} learners per condition, 95% for all at once"
+    if not others:
+        return "There is nothing else to compare it with."
+    if not leader.contenders:
+        return f"That is sure: no {other} is as good ({learners})."
+    named = [readable(condition) for condition in leader.contenders[:MOST_NAMED]]
+    more = len(leader.contenders) - len(named)
+    return (
+        f"It is not sure to be the best: of {others} others, {len(named) + more} may be as good "
+        f"({learners}): {listed(named, more)}."
+    )
+
+
+def listed(named: Sequence[str], more: int = 0) -> str:
+    """Names of several conditions, which have commas in them, and how many more there are."""
+    return "; ".join([*named, *([f"and {more} more"] if more else [])])
+
+
+def _traded(about: LearnerFindings) -> str:
+    """What is gained and lost between the condition that teaches and the one that performs best."""
+    if about.trade is None:
+        return "One condition both performs and teaches best, so these results show no trade."
+    found: Trade = about.trade
+    between = about.frontier.filter("pareto").height - 2
+    gained, lost = (_amount(one, about.decimals) for one in (found.gained, found.lost))
+    more = f" Between the two, {between} more are Pareto-optimal." if between > 0 else ""
+    return (
+        f"The trade: from {readable(found.teaching)} to {readable(found.performing)}, assisted "
+        f"episodes return {gained} more and unassisted ones {lost} less.{more}"
+    )
+
+
+def _amount(found: IntervalEstimate, decimals: int) -> str:
+    """By how much, with its interval, and a remark if that may be nothing at all."""
+    digits = decimals_for(found.low, found.high, decimals)
+    mean, low, high = (format_number(value, digits) for value in found)
+    if not isfinite(found.low):
+        return f"{mean} (no interval)"
+    doubt = ", perhaps nothing" if found.low <= 0 else ""
+    return f"{mean} (95% interval {low} to {high}{doubt})"
+
+
+def overriding(rows: pl.DataFrame) -> pl.DataFrame:
     """Settings that override at all; every one if none does."""
     overriding = rows.filter(pl.col("overrides_mean") > 0)
     return overriding if overriding.height else rows
 
 
-def _name(assistant: str) -> str:
+def named(assistant: str) -> str:
+    """An assistant as readers call it."""
     return NAMES.get(assistant, assistant)
 
 
 def _largest(methods: pl.DataFrame) -> Iterator[str]:
     """Which method covers most, as a share of what all conditions cover together."""
     best = methods.sort("hypervolume_mean", descending=True).row(0, named=True)
-    if best["share"]:
-        name, largest = _name(best["assistant"]), format_share(best["largest"])
+    if best["share"] and best["conditions"] > 1:
+        name, largest = named(best["assistant"]), format_share(best["largest"])
         yield (
-            f"{name} covers {format_share(best['share'])} of the performance and learning that all "
-            f"conditions cover together, the most of all methods (in {largest} of the resamples)."
+            f"Over all its settings, {name} covers {format_share(best['share'])} of the area "
+            "of performance and learning that all conditions cover, the most of all methods (in "
+            f"{largest} of the resamples)."
         )
 
 
-def _best_settings(rows: pl.DataFrame) -> str:
+def _best_settings(rows: pl.DataFrame, decimals: int) -> str:
     """At which settings an assistant teaches best and performs best."""
-    name = _name(str(rows["assistant"][0]))
+    name = named(str(rows["assistant"][0]))
     learning = rows.sort("unassisted_mean", descending=True).row(0, named=True)
     performing = rows.sort("assisted_mean", descending=True).row(0, named=True)
     if rows.height == 1:
-        return f"{readable(learning['condition'])} returns {_returns(learning)}."
+        return f"{readable(str(learning['condition']))} returns {_returns(learning, decimals)}."
     at_learning, at_performing = (setting(row["condition"]) for row in (learning, performing))
+    at_best = _returns(learning, decimals)
     if at_learning == at_performing:
-        return f"{name} both teaches and performs best at {at_learning}: {_returns(learning)}."
+        return f"{name} both teaches and performs best at {at_learning}: {at_best}."
     return (
-        f"{name} teaches best at {at_learning}: {_returns(learning)}; and performs best at "
-        f"{at_performing}: {_returns(performing)}."
+        f"{name} teaches best at {at_learning}: {at_best}; and performs best at {at_performing}: "
+        f"{_returns(performing, decimals)}."
     )
 
 
-def _returns(row: Mapping[str, Any]) -> str:
-    assisted, unassisted = (_interval(row, measure) for measure in ("assisted", "unassisted"))
+def _returns(row: Mapping[str, Any], decimals: int) -> str:
+    assisted, unassisted = (_interval(row, m, decimals) for m in ("assisted", "unassisted"))
     if row["assistant"] == "none":
         return f"{assisted} in training and {unassisted} in greedy episodes"
     return f"{assisted} assisted, {unassisted} unassisted"
 
 
-def _interval(row: Mapping[str, Any], measure: str) -> str:
+def _interval(row: Mapping[str, Any], measure: str, decimals: int) -> str:
     """A mean return and half the width of its interval."""
     mean, low, high = (row[f"{measure}_{part}"] for part in ("mean", "low", "high"))
-    digits = decimals_for(low, high)
+    digits = decimals_for(low, high, decimals)
     if low is None:
         return format_number(mean, digits)
     return f"{format_number(mean, digits)} ± {format_number((high - low) / 2, digits)}"
 
 
-def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
-    ours, theirs = _name(method), _name(baseline)
+def _regret(about: LearnerFindings, matched: str, regret: Regret) -> str:
+    ours, theirs = (named(name) for name in about.compared or ("", ""))
     reduction = regret.reduction
     if isnan(regret.method.mean):
         return f"At matched {matched}, no setting of {ours} reaches the level of {theirs}."
-    if isnan(reduction.mean):
+    if regret.gap.mean == 0:
         return f"At matched {matched}, {theirs} is itself the best: it leaves no regret to reduce."
     compared = {"performance": "learning", "learning": "performance"}[matched]
+    if not regret.is_known:
+        return (
+            f"At matched {matched}, how much regret in {compared} {ours} saves over {theirs} is "
+            f"not known: the regret of {theirs} itself, {_plain(regret.gap, about.decimals)}, is "
+            "not surely above zero."
+        )
+    if reduction.low <= 0 <= reduction.high:
+        return (
+            f"At matched {matched}, it is open whether {ours} has less regret in {compared} than "
+            f"{theirs} or more: the reduction is {format_share(reduction.mean)} (95% interval "
+            f"{format_share(reduction.low)} to {format_share(reduction.high)})."
+        )
     amount = f"{abs(100 * reduction.mean):.0f}% {'less' if reduction.mean >= 0 else 'more'}"
-    interval = "its interval is not known"
+    interval = "in many resamples no setting reaches that level, so this has no interval"
     if not isnan(reduction.low):
         ends = f"{format_share(reduction.low)} to {format_share(reduction.high)}"
         interval = f"95% interval of the reduction {ends}"
@@ -116,6 +196,13 @@ def _regret(matched: str, regret: Regret, method: str, baseline: str) -> str:
         f"At matched {matched}, {ours} has {amount} regret in {compared} than {theirs} "
         f"({interval})."
     )
+
+
+def _plain(found: IntervalEstimate, decimals: int) -> str:
+    """A number with its interval, if that is known."""
+    digits = decimals_for(found.low, found.high, max(decimals, decimals_of([0.0, found.mean])))
+    mean, low, high = (format_number(value, digits) for value in found)
+    return f"{mean} (95% interval {low} to {high})" if isfinite(found.low) else mean
 
 
 def _against_control(differences: pl.DataFrame) -> str:
@@ -136,74 +223,3 @@ def _against_control(differences: pl.DataFrame) -> str:
         f"{counts['unassisted', 'better']} teach significantly better and "
         f"{counts['unassisted', 'worse']} worse (95% for all at once)."
     )
-
-
-def cautions(findings: Findings, experiment: Experiment) -> list[str]:
-    """What to keep in mind when reading the results.
-
-    Args:
-        findings: what the tables say about a run.
-        experiment: as run.
-
-    Returns:
-        Sentences; empty if there is nothing to warn of.
-    """
-    return [
-        *_of_what_is_missing(findings, experiment),
-        *_of_size(findings, experiment),
-        *findings.additions.cautions,
-        *_of_ties(findings),
-    ]
-
-
-def _of_what_is_missing(findings: Findings, experiment: Experiment) -> Iterator[str]:
-    if not findings.missing:
-        return
-    absent = findings.missing.keys() - set(findings.summary["condition"])
-    conditions = findings.summary.height + len(absent)
-    of, lacking = conditions * experiment.trials, list(findings.missing.items())
-    there = of - sum(findings.missing.values())
-    named = [f"{name} ({experiment.trials - n} of {experiment.trials})" for name, n in lacking]
-    more = f" and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
-    yield (
-        f"The run is not finished: {there:,} of {of:,} trials are there, and "
-        f"{len(lacking)} of {conditions} conditions lack some: {', '.join(named[:MOST_NAMED])}"
-        f"{more}. Run it again to continue."
-    )
-
-
-def _of_size(findings: Findings, experiment: Experiment) -> Iterator[str]:
-    trials = findings.summary["trials"].to_list()
-    if max(trials) == 1:
-        yield "There is one trial per condition: nothing here has an interval."
-    elif min(trials) == 1:
-        yield "Conditions of a single trial have no interval, nor has what they enter into."
-    elif min(trials) < FEW_TRIALS:
-        yield (
-            f"There are only {min(trials)} trials per condition: intervals are wide, and "
-            f"those from resampling tend to be too narrow below {FEW_TRIALS} trials."
-        )
-    if experiment.episodes == 1:
-        yield "There is one episode per trial: no learner had the time to learn."
-
-
-def _of_ties(findings: Findings) -> Iterator[str]:
-    """Settings whose intervals overlap with the best one's."""
-    close = [text for about in findings.learners for text in _close_settings(about)]
-    if close:
-        yield (
-            "Which setting teaches best is uncertain: intervals overlap with the best one's for "
-            f"{'; '.join(close)}. The best of several noisy means looks better than it is."
-        )
-
-
-def _close_settings(about: LearnerFindings) -> Iterator[str]:
-    for part in about.summary.partition_by("assistant", maintain_order=True):
-        settings = _overriding(part)
-        best = settings.sort("unassisted_mean", descending=True).row(0, named=True)
-        if best["unassisted_low"] is None:
-            continue
-        close = settings.filter(pl.col("unassisted_high") >= best["unassisted_low"]).height
-        if close > 1:
-            where = f" with {about.label}" * bool(about.label)
-            yield f"{close} of {settings.height} settings of {_name(best['assistant'])}{where}"

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from qbumpers.analysis.figures.style import NAMES
 from qbumpers.analysis.findings import Findings
 from qbumpers.analysis.formatting import format_number
+from qbumpers.analysis.page import points
 from qbumpers.analysis.page import tables as page_tables
 from qbumpers.experiments.store import EXPERIMENT, Results, run_description
 
@@ -81,6 +82,13 @@ def _template() -> jinja2.Template:
         undefined=jinja2.StrictUndefined,
     )
     environment.filters |= {"number": format_number}
+    environment.globals |= {
+        "panels": points.panels,
+        "width": points.WIDTH,
+        "height": points.HEIGHT,
+        "left": points.LEFT,
+        "below": points.BELOW,
+    }
     return environment.get_template("report.html.j2")
 
 

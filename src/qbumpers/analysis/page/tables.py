@@ -9,9 +9,10 @@ from markupsafe import Markup
 from qbumpers.analysis.comparisons import RETURNS
 from qbumpers.analysis.figures.style import NAMES
 from qbumpers.analysis.findings import LearnerFindings
-from qbumpers.analysis.formatting import NONE, format_number, format_share
+from qbumpers.analysis.formatting import NONE, decimals_of, format_number, format_share
 from qbumpers.analysis.measures import MEASURES
 from qbumpers.analysis.page.elements import Column, Table, breakable, interval, share, unbroken
+from qbumpers.analysis.statistics import UNKNOWN
 
 
 def _of(row: Mapping[str, Any], measure: str, least: int = 1) -> Markup:
@@ -19,20 +20,27 @@ def _of(row: Mapping[str, Any], measure: str, least: int = 1) -> Markup:
     return interval(mean, low, high, least)
 
 
+def _decimals(table: pl.DataFrame, *measures: str) -> int:
+    """Of numbers that are not returns: without any, unless they differ by little."""
+    ends = [f"{measure}_{part}" for measure in measures for part in ("mean", "low", "high")]
+    found = decimals_of(table.select(ends).to_numpy().astype(float).ravel().tolist())
+    return 0 if found == 1 else found
+
+
 def pareto_table(about: LearnerFindings) -> Table:
     """The Pareto-optimal conditions, and others that might be; best performance first."""
     columns = [
         Column("condition", text=True),
-        Column("assisted return"),
-        Column("unassisted return"),
+        Column("assisted return per episode"),
+        Column("unassisted return per episode"),
         Column("probability Pareto-optimal"),
     ]
     chosen = about.frontier.filter(pl.col("pareto") | (pl.col("probability") >= 0.05))
     rows = [
         [
             unbroken(row["condition"]) + ("" if row["pareto"] else " (beaten here)"),
-            _of(row, "assisted"),
-            _of(row, "unassisted"),
+            _of(row, "assisted", about.decimals),
+            _of(row, "unassisted", about.decimals),
             format_share(row["probability"]),
         ]
         for row in chosen.sort("assisted_mean", descending=True).iter_rows(named=True)
@@ -42,23 +50,24 @@ def pareto_table(about: LearnerFindings) -> Table:
 
 def methods_table(about: LearnerFindings) -> Table:
     """Whole methods: their mean returns, and what their settings cover."""
+    digits = _decimals(about.methods, "hypervolume")
     columns = [
         Column("method", text=True),
         Column("settings"),
-        Column("mean assisted return"),
-        Column("mean unassisted return"),
+        Column("mean assisted return per episode"),
+        Column("mean unassisted return per episode"),
         Column("covers of all"),
-        Column("hypervolume"),
+        Column("hypervolume, squared return"),
         Column("covers most"),
     ]
     rows = [
         [
             NAMES.get(row["assistant"], row["assistant"]),
             str(row["conditions"]),
-            _of(row, "assisted_macro"),
-            _of(row, "unassisted_macro"),
+            _of(row, "assisted_macro", about.decimals),
+            _of(row, "unassisted_macro", about.decimals),
             format_share(row["share"]),
-            _of(row, "hypervolume", 0),
+            _of(row, "hypervolume", digits),
             format_share(row["largest"]),
         ]
         for row in about.methods.iter_rows(named=True)
@@ -68,16 +77,17 @@ def methods_table(about: LearnerFindings) -> Table:
 
 def advantage_table(about: LearnerFindings) -> Table:
     """Every two methods by what their settings cover."""
+    digits = _decimals(about.advantages, "advantage")
     columns = [
         Column("method", text=True),
         Column("against", text=True),
-        Column("covers more by"),
+        Column("covers more by, squared return"),
         Column("share of resamples in which it covers more"),
     ]
     rows = [
         [
             *(NAMES.get(row[who], row[who]) for who in ("assistant", "other")),
-            _of(row, "advantage", 0),
+            _of(row, "advantage", digits),
             format_share(row["probability"]),
         ]
         for row in about.advantages.iter_rows(named=True)
@@ -95,16 +105,18 @@ def regret_table(about: LearnerFindings) -> Table:
         Column("baseline"),
         Column("method"),
         Column("best possible"),
+        Column("baseline's regret"),
     ]
     rows = [
         [
             matched,
-            share(*regret.reduction),
+            share(*(regret.reduction if regret.is_known else UNKNOWN)),
             unbroken(regret.baseline_condition),
-            format_number(regret.level),
-            format_number(regret.baseline),
-            interval(*regret.method),
-            format_number(regret.best),
+            format_number(regret.level, about.decimals),
+            format_number(regret.baseline, about.decimals),
+            interval(*regret.method, about.decimals),
+            format_number(regret.best, about.decimals),
+            interval(*regret.gap, about.decimals),
         ]
         for matched, regret in about.regrets.items()
     ]
@@ -126,7 +138,7 @@ def differences_table(about: LearnerFindings) -> Table:
         cells = found.setdefault(row["condition"], [unbroken(row["condition"])])
         numbers = (row["difference_mean"], row["simultaneous_low"], row["simultaneous_high"])
         cells += [
-            interval(*numbers),
+            interval(*numbers, about.decimals),
             _p_value(row["p_adjusted"]),
             format_share(row["improvement_mean"]),
         ]
@@ -160,7 +172,9 @@ def dependence_table(about: LearnerFindings) -> Table:
         [
             unbroken(row["condition"]),
             *(
-                format_share(row[f"{name}_mean"]) if name == "criterion_reached" else _of(row, name)
+                format_share(row[f"{name}_mean"])
+                if name == "criterion_reached"
+                else _of(row, name, 1 if name == "criterion_episodes" else about.decimals)
                 for name in known
             ),
         ]
@@ -172,11 +186,12 @@ def dependence_table(about: LearnerFindings) -> Table:
 def learners_table(learners: Sequence[LearnerFindings], measure: str) -> Table:
     """One measure of every condition, a column per learner."""
     columns = [Column("condition", text=True), *(Column(about.label) for about in learners)]
+    digits = max(about.decimals for about in learners)
     found: dict[str, dict[str, Markup]] = {}
     for about in learners:
         for row in about.summary.iter_rows(named=True):
             shared = str(row["condition"]).partition("@")[0]
-            found.setdefault(shared, {})[about.learner] = _of(row, measure)
+            found.setdefault(shared, {})[about.learner] = _of(row, measure, digits)
     rows = [
         [unbroken(condition), *(cells.get(about.learner, NONE) for about in learners)]
         for condition, cells in found.items()
@@ -195,21 +210,21 @@ def missing_table(missing: Mapping[str, int], trials: int) -> Table:
 
 
 def conditions_table(about: LearnerFindings) -> Table:
-    """Every condition, under its id."""
+    """Every condition, under its id; a heading says which learner."""
     events = _known(about.summary, ("unassisted_success", "unassisted_crash"))
     columns = [
         Column("condition", text=True),
-        Column("assisted return"),
-        Column("unassisted return"),
+        Column("assisted return per episode"),
+        Column("unassisted return per episode"),
         Column("overrides per episode", secondary=True),
         Column("overridden steps", secondary=True),
         *(Column(name.replace("_", " "), secondary=True) for name in events),
     ]
     rows = [
         [
-            breakable(row["condition"]),
-            _of(row, "assisted"),
-            _of(row, "unassisted"),
+            breakable(row["condition"].partition("@")[0]),
+            _of(row, "assisted", about.decimals),
+            _of(row, "unassisted", about.decimals),
             format_number(row["overrides_mean"], 2),
             format_share(row["override_rate_mean"]),
             *(format_share(row[f"{name}_mean"]) for name in events),
