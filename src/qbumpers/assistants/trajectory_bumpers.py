@@ -50,7 +50,13 @@ def steps_to(path: tuple[int, ...], model: Model) -> np.ndarray:
     dynamics, distance = model.dynamics, np.full(model.states, np.inf)
     for state in path:
         if state >= model.states:
-            raise RequestError("path: it has a number that is no state's; all must lie in [0, S)")
+            raise RequestError(
+                "assistant trajectory-bumpers: path has the state "
+                + str(state)
+                + "; the task's states lie in [0, "
+                + str(model.states)
+                + ")"
+            )
         distance[state] = 0.0
     width = dynamics.actions * dynamics.outcomes
     changed, found = True, 0.0
