@@ -1,9 +1,8 @@
 """Bumpers around a path (after virtual fixtures, Abbott, Marayong and Okamura 2007).
 
-A virtual fixture that forbids regions lets a hand move freely near a reference path and resists at
-its walls.
-The distance of a state from the path is the number of steps in which the path can be reached
-again, over transitions that can happen:
+A virtual fixture that forbids regions lets a hand move freely near a reference path and resists
+where the region ends. The distance of a state from the path is the number of steps in which the
+path can be reached again, over transitions that can happen:
 
     D(s) = 0 on the path,  D(s) = 1 + min {D(s') : p(s' | s, a) > 0 for some a}  elsewhere.
 
