@@ -6,6 +6,7 @@ around an environment that plays it.
 """
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple, Unpack
 
 import gymnasium
@@ -279,7 +280,8 @@ def small_values(task: Task, assistant: Assistant) -> Any:
         values = _WithOthers(np.asarray(solved.table), solved.discount)
         values.others = others
         return values
-    return _random_network(generator, task)
+    others = {name: _random_network(generator, task) for name in assistant.values}
+    return replace(_random_network(generator, task), others=others)
 
 
 def _random_table(generator: np.random.Generator, task: Task) -> np.ndarray:

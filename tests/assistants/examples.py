@@ -17,7 +17,7 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "shield": {"threshold": 0.5},
     "advice-on-a-budget": {"when": "mistakes", "budget": 9, "threshold": 0.5},
     "penalised-interventions": {"target": 0.2, "rate": 0.5},
-    "risk-and-novelty": {"visits": 2, "risk": 1.5 / 2, "release": 0.25},
+    "risk-and-novelty": {"visits": 2, "risk": 0.75, "release": 0.25},
     "expert-mixing": {"share": 0.8, "decay": 0.5},
     "assist-as-needed": {"forgetting": 0.5, "gain": 1.0, "dead_band": 0.125, "v_min": -10.0},
     "undo": {"tolerance": 0.5},

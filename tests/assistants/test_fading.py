@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers import RequestError, make_assistant
+from qbumpers.conformance import check_conformance, slippery_corridor
 from qbumpers.decisions import Decision, Noise
 from tests.assistants.otherwise import bumpers
 from tests.assistants.situations import model_of, situation_of, situations
@@ -60,3 +61,9 @@ def test_falls_happen_in_late_episodes_which_the_bumpers_below_go_on_stopping():
 def test_the_half_life_is_a_finite_number_above_0(half_life):
     with pytest.raises(RequestError, match=f"assistant fading: half_life = {half_life}"):
         make_assistant("fading", of="maximal", half_life=half_life)
+
+
+def test_over_a_rule_that_undoes_it_does_the_same_in_every_host():
+    assistant = make_assistant("fading", of="undo", half_life=2.0)
+    assert assistant.needs == {"undo"}
+    assert check_conformance(assistant, tasks=[slippery_corridor()])

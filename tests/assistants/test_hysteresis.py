@@ -3,6 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from qbumpers import RequestError, make_assistant
+from qbumpers.conformance import check_conformance, slippery_corridor
 from qbumpers.decisions import Decision, Noise
 from tests.assistants.otherwise import bumpers
 from tests.assistants.situations import model_of, situation_of, step_of
@@ -66,3 +67,9 @@ def test_a_trifle_after_a_fall_is_mended_which_the_bumpers_below_let_pass():
 def test_a_count_of_calm_steps_is_at_least_1():
     with pytest.raises(RequestError, match="assistant hysteresis: calm = 0"):
         make_assistant("hysteresis", of="maximal", calm=0)
+
+
+def test_over_a_rule_that_undoes_it_does_the_same_in_every_host():
+    assistant = make_assistant("hysteresis", of="undo", calm=2)
+    assert assistant.needs == {"undo"}
+    assert check_conformance(assistant, tasks=[slippery_corridor()])

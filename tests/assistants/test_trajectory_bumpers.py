@@ -115,5 +115,9 @@ def test_options_have_bounds(options, message):
 
 
 def test_a_path_through_states_that_are_none_is_refused():
-    with pytest.raises(RequestError, match=r"path: .*no state's"):
-        simulate(CLIFF, make_assistant("trajectory-bumpers", path=(0, 48), reach=1), trials=1)
+    assistant = make_assistant("trajectory-bumpers", path=(0, 48), reach=1)
+    message = r"trajectory-bumpers: path has the state 48; the task's states lie in \[0, 48\)"
+    with pytest.raises(RequestError, match=message):
+        simulate(CLIFF, assistant, trials=1)
+    with pytest.raises(RequestError, match=message):
+        assistant.start(model_of(CLIFF))

@@ -1,8 +1,8 @@
 """A mixture of expert and learner whose share falls from episode to episode (DAgger).
 
 Ross, Gordon and Bagnell (2011) collect the data of iteration i with the policy
-pi_i = beta_i pi* + (1 - beta_i) pi_hat_i, and name beta_i = p**i as one that falls fast enough.
-Here the episodes are the iterations, beta = share * decay**episode.
+pi_i = beta_i pi* + (1 - beta_i) pi_hat_i, and name beta_i = p**(i - 1) as one that falls fast
+enough. Here the episodes are the iterations, beta = share * decay**episode, counted from 0.
 """
 
 from typing import Annotated, NamedTuple

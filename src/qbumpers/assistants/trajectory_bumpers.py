@@ -1,9 +1,8 @@
 """Bumpers around a path (after virtual fixtures, Abbott, Marayong and Okamura 2007).
 
-A virtual fixture that forbids regions lets a hand move freely near a reference path and resists at
-its walls.
-The distance of a state from the path is the number of steps in which the path can be reached
-again, over transitions that can happen:
+A virtual fixture that forbids regions lets a hand move freely near a reference path and resists
+where the region ends. The distance of a state from the path is the number of steps in which the
+path can be reached again, over transitions that can happen:
 
     D(s) = 0 on the path,  D(s) = 1 + min {D(s') : p(s' | s, a) > 0 for some a}  elsewhere.
 
@@ -50,7 +49,13 @@ def steps_to(path: tuple[int, ...], model: Model) -> np.ndarray:
     dynamics, distance = model.dynamics, np.full(model.states, np.inf)
     for state in path:
         if state >= model.states:
-            raise RequestError("path: it has a number that is no state's; all must lie in [0, S)")
+            raise RequestError(
+                "assistant trajectory-bumpers: path has the state "
+                + str(state)
+                + "; the task's states lie in [0, "
+                + str(model.states)
+                + ")"
+            )
         distance[state] = 0.0
     width = dynamics.actions * dynamics.outcomes
     changed, found = True, 0.0
