@@ -10,12 +10,12 @@ from qbumpers.analysis.figures.curves import learning_curves, override_courses
 from qbumpers.analysis.measures import MEASURES, trial_measures
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
-from qbumpers.experiments.record import CONDITIONS, Record, RecordedCondition, decoded_record
+from qbumpers.experiments.record import CONDITIONS, RecordedCondition, decoded_record
 from qbumpers.experiments.store import (
     EXPERIMENT,
-    conditions_of,
     load,
     load_design,
+    record_of,
     run_description,
 )
 from qbumpers.files import open_folder, write_atomically
@@ -76,7 +76,7 @@ def archive_run(folder: str | Path, into: str | Path, choose: Choose) -> None:
     write_rounded(Path(into) / CURVES, curves)
     write_rounded(Path(into) / OVERRIDES, overrides)
     settings = (Path(folder) / EXPERIMENT).read_bytes()
-    noted = Record(results.conditions).encoded()
+    noted = results.record.encoded()
     for name, content in ((EXPERIMENT, settings), (CONDITIONS, noted)):
         write_atomically(Path(into) / name, lambda path, content=content: path.write_bytes(content))
 
@@ -99,7 +99,7 @@ def load_archive(folder: str | Path) -> Archive:
         trials=trials,
         curves=_read(place / CURVES),
         overrides=_read(place / OVERRIDES),
-        conditions=conditions_of(record, experiment, trials),
+        conditions=record_of(record, experiment, trials).conditions,
     )
 
 

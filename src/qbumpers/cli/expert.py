@@ -53,6 +53,13 @@ Corrected = Annotated[
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
+EpisodeLimit = Annotated[
+    int | None,
+    typer.Option(
+        help="Steps per episode of a Gymnasium environment.", show_default="its own", metavar="N",
+        min=1,
+    ),
+]  # fmt: skip
 Observe = Annotated[
     str | None,
     typer.Option(
@@ -114,6 +121,7 @@ def expert(
     out: Out = None,
     corrected: Corrected = None,
     discount: Discount = None,
+    episode_limit: EpisodeLimit = None,
     imports: Imports = None,
     observe: Observe = None,
     estimated: Estimated = None,
@@ -145,7 +153,9 @@ def expert(
 
     import_modules(imports or (), "--import")
     keys = None if observe is None else [key for key in observe.split(",") if key]
-    made = make_task(task, discount=discount, observe=keys, estimated=estimated)
+    made = make_task(
+        task, discount=discount, episode_limit=episode_limit, observe=keys, estimated=estimated
+    )
     if figures is not None and check is None:
         raise RequestError(f"--figures {figures}: they are of a check; give --check FILE too")
     _check_conversion(made, check, convert, statistics)

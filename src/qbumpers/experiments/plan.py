@@ -110,8 +110,17 @@ def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | No
         check_expert(task, values)
     files: dict[str, np.ndarray] = {}
     noted = _noted(task, named, conditions, files)
-    record = noted._replace(task=task.digest(), values=values.digest())
+    record = noted._replace(
+        task=task.digest(), values=values.digest(), discount=task.discount, starts=_starts(task)
+    )
     return Plan(experiment, task, values, named, conditions, record, files)
+
+
+def _starts(task: Task) -> list[int]:
+    if not task.states:
+        return []
+    states = np.flatnonzero(task.start)
+    return sorted({*(states if task.seen is None else task.seen[states]).tolist()})
 
 
 def _noted(

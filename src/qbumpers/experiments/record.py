@@ -55,12 +55,17 @@ class Record(NamedTuple):
         values: digest of Q*.
         identities: the parts of every identity that some trial in the folder was simulated with, by
             digest.
+        discount: gamma of the task; None if the folder does not note it.
+        starts: numbers of what the assistant sees in the states in which an episode can start;
+            empty if states are not numbered, or the folder does not note it.
     """
 
     conditions: Sequence[RecordedCondition]
     task: str = ""
     values: str = ""
     identities: Mapping[str, Mapping[str, Any]] = {}
+    discount: float | None = None
+    starts: Sequence[int] = ()
 
     def by_id(self) -> dict[str, RecordedCondition]:
         """The conditions by their readable ids."""
@@ -93,7 +98,8 @@ def decoded_record(content: bytes | None) -> Record | None:
         record = TypeAdapter(Record).validate_json(content or b"")
     except ValidationError:
         return None
-    known = all(each.identity in record.identities for each in record.conditions)
+    noted = [each.identity for each in record.conditions if each.identity]
+    known = all(identity in record.identities for identity in noted)
     return record if known else None
 
 

@@ -47,14 +47,19 @@ class Results(NamedTuple):
         episodes: a row per episode.
         states: a row per condition and state; None if observations are vectors.
         values: Q* of the assistants.
-        conditions: what is noted of each.
+        record: what is noted of the task and of each condition.
     """
 
     experiment: Experiment
     episodes: pl.DataFrame
     states: pl.DataFrame | None
     values: TabularValues | NetworkValues
-    conditions: Sequence[RecordedCondition]
+    record: Record
+
+    @property
+    def conditions(self) -> Sequence[RecordedCondition]:
+        """What is noted of each condition."""
+        return self.record.conditions
 
     @property
     def missing(self) -> dict[str, int]:
@@ -84,17 +89,17 @@ def load(folder: str | Path, *, unfinished: bool = False) -> Results:
             unless that is allowed and some trials are.
     """
     place = open_folder(folder)
-    experiment, record = load_design(folder), decoded_record(place.read(CONDITIONS))
-    tables = _whole_tables(place, experiment, record)
-    if tables is None and unfinished and record is not None:
-        tables = _tables_of_cells(place, experiment, record)
+    experiment, noted = load_design(folder), decoded_record(place.read(CONDITIONS))
+    tables = _whole_tables(place, experiment, noted)
+    if tables is None and unfinished and noted is not None:
+        tables = _tables_of_cells(place, experiment, noted)
     if tables is None:
         raise RequestError(
             f"results folder {folder}: the run is not finished; run it again to continue"
         )
-    conditions = conditions_of(record, experiment, tables[EPISODES])
+    record = record_of(noted, experiment, tables[EPISODES])
     values = _values(place, experiment)
-    return Results(experiment, tables[EPISODES], tables.get(STATES), values, conditions)
+    return Results(experiment, tables[EPISODES], tables.get(STATES), values, record)
 
 
 def _values(folder: Folder, experiment: Experiment) -> TabularValues | NetworkValues:
@@ -123,7 +128,7 @@ def _whole_tables(
     for name, table in tables.items():
         check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
-    ids = {each.condition for each in conditions_of(record, experiment, episodes)}
+    ids = set(record_of(record, experiment, episodes).by_id())
     rows = len(ids) * experiment.trials * (experiment.episodes + experiment.retention)
     whole = episodes.height == rows and set(episodes["condition"].unique()) == ids
     return tables if whole else None
@@ -162,10 +167,8 @@ def files_to_read(folder: str | Path) -> Iterator[str]:
             yield from (file.name for file in cell_files(place, each.content))
 
 
-def conditions_of(
-    record: Record | None, experiment: Experiment, table: pl.DataFrame
-) -> Sequence[RecordedCondition]:
-    """The conditions of a run, found out if its folder does not note them, as old ones do not.
+def record_of(record: Record | None, experiment: Experiment, table: pl.DataFrame) -> Record:
+    """What is noted of a run; its conditions are found out if it is nothing, as of old folders.
 
     Args:
         record: what the folder notes; None if that is nothing.
@@ -173,17 +176,20 @@ def conditions_of(
         table: with columns condition, assistant, alpha and learner.
     """
     if record is not None:
-        return record.conditions
+        return record
     try:
-        return [recorded(named) for named in experiment.conditions()]
+        return Record([recorded(named) for named in experiment.conditions()])
     except RequestError:  # what they name is not there any more
         columns = ("condition", "assistant", "alpha", "learner")
-        return [
-            RecordedCondition(
-                **row, options={} if row["alpha"] is None else {"alpha": row["alpha"]}
-            )
-            for row in table.select(columns).unique(maintain_order=True).iter_rows(named=True)
-        ]
+        rows = table.select(columns).unique(maintain_order=True).iter_rows(named=True)
+        return Record(
+            [
+                RecordedCondition(
+                    **row, options={} if row["alpha"] is None else {"alpha": row["alpha"]}
+                )
+                for row in rows
+            ]
+        )
 
 
 def load_design(folder: str | Path) -> Experiment:

@@ -10,10 +10,8 @@ from qbumpers.analysis.findings import Findings, LearnerFindings
 from qbumpers.analysis.formatting import decimals_for, format_number, format_share
 from qbumpers.analysis.page.headlines import named
 from qbumpers.analysis.statistics import IntervalEstimate, difference
-from qbumpers.errors import RequestError
 from qbumpers.experiments.record import RecordedCondition
 from qbumpers.experiments.store import Results
-from qbumpers.tasks import Task
 from qbumpers.values import TabularValues
 
 _MANY = 0.05  # of the start states: fewer without room for a loss change little
@@ -41,21 +39,12 @@ def doubts(findings: Findings, results: Results) -> list[str]:
 
 
 def _of_the_discount(results: Results) -> Iterator[str]:
-    task = _task(results)
-    discount = results.experiment.task.discount if task is None else task.discount
+    discount = results.record.discount
     if discount is not None and discount != results.values.discount:
         yield (
             f"The values were made with discount {results.values.discount:g}, and the task has "
             f"discount {discount:g}: assistants judge actions by another goal than the task's."
         )
-
-
-def _task(results: Results) -> Task | None:
-    """The task of a run, if it can still be made: an environment of one's own may not be here."""
-    try:
-        return results.experiment.task.task()
-    except RequestError:
-        return None
 
 
 def _of_flat_values(results: Results) -> Iterator[str]:
@@ -109,12 +98,11 @@ def _of_floors(results: Results) -> Iterator[str]:
     for each in results.conditions:
         if "v_min" in each.options:
             floors.setdefault((each.assistant, float(each.options["v_min"])), []).append(each)
-    values, task = results.values, _task(results) if floors else None
-    if task is None or not task.states or not isinstance(values, TabularValues):
+    values = results.values
+    if not (floors and results.record.starts and isinstance(values, TabularValues)):
         return
-    table = values.table if task.seen is None else values.table[task.seen]
-    starts = table[np.flatnonzero(task.start)].max(axis=1)
-    losses = table.max(axis=1, keepdims=True) - table
+    starts = np.array([values(state).max() for state in results.record.starts])
+    losses = values.table.max(axis=1, keepdims=True) - values.table
     usual = float(np.median(losses[losses > 0])) if (losses > 0).any() else 0.0
     for (assistant, floor), settings in floors.items():
         alpha = max(float(each.options.get("alpha", 1.0)) for each in settings)
