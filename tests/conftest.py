@@ -1,5 +1,6 @@
 """What every test shares."""
 
+import signal
 import sys
 
 import pytest
@@ -28,6 +29,14 @@ def _registries_of_its_own(monkeypatch):
 def own_registry(monkeypatch):
     """Rules and learners registered by a test are forgotten when it ends."""
     _registries_of_its_own(monkeypatch)
+
+
+@pytest.fixture(autouse=True)
+def signals_stay():
+    """A test leaves the interrupt as it found it: blocked, it would end nothing any more."""
+    yield
+    if hasattr(signal, "pthread_sigmask"):
+        assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 @pytest.fixture(scope="module")

@@ -211,7 +211,7 @@ def test_the_name_of_a_folder_is_printed_as_it_is(call, tmp_path):
 
 
 def break_unexpectedly(monkeypatch):
-    def odd(path, *, large):
+    def odd(*_, **__):
         raise ZeroDivisionError("nobody thought of this")
 
     monkeypatch.setattr("qbumpers.experiments.sources.load_experiment", odd)

@@ -63,7 +63,7 @@ def test_a_wrong_request_exits_with_2_and_one_line(tmp_path):
     status, output, errors = call("run", path)
     assert (status, output) == (2, "")
     assert errors.startswith("error: ")
-    assert "unknown assistant 'bumpers' (did you mean 'stochastic-q-bumpers'?)" in errors
+    assert "unknown assistant 'bumpers' (did you mean 'hard-bumpers'?)" in errors
     assert len(errors.splitlines()) == 1
 
 
@@ -132,7 +132,7 @@ def test_ctrl_c_keeps_finished_cells_whole(interrupted):
 def test_an_unexpected_error_has_a_traceback_only_on_request():
     odd = (
         "import sys, qbumpers.cli as cli, qbumpers.experiments.sources as sources\n"
-        "sources.load_experiment = lambda path, large: 1 / 0\n"
+        "sources.load_experiment = lambda *_, **__: 1 / 0\n"
         "cli.main()"
     )
     found = [

@@ -38,6 +38,7 @@ PAGES = {
 }
 RUNNING = ("python", "sh")
 RUN_LANGUAGES = (*RUNNING, "toml", "text")
+OTHERS = "docs/third-party.md"  # needs packages that this one does not
 INTERNAL = ("borrowing", "cli", "compilation", "errors", "files", "kept_code", "source")
 INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
 CITED_HOSTS = {"doi.org", "arxiv.org"}
@@ -100,13 +101,16 @@ def script_of(blocks):
     return "\n".join(parts)
 
 
-def printed_by(blocks, folder):
-    """What each block of a page prints."""
+def printed_by(blocks, folder, more=""):
+    """What each block of a page prints; `more` is a folder with packages of others."""
     script = folder / "page.py"
     script.write_text(script_of(blocks), encoding="utf-8")
     working = folder / "working"
     working.mkdir()
     environment = {**os.environ, "MPLBACKEND": "Agg", "COLUMNS": "110", "PYTHONIOENCODING": "utf-8"}
+    if more:
+        paths = [os.environ.get("PYTHONPATH", ""), str(more)]
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     finished = subprocess.run(
         [sys.executable, str(script)],
         cwd=working, env=environment, capture_output=True, text=True, encoding="utf-8",
@@ -115,10 +119,10 @@ def printed_by(blocks, folder):
     return finished.stdout.split(_MARK + "\n")[1:]
 
 
-def shown_and_printed(page, folder):
+def shown_and_printed(page, folder, more=""):
     """For each block that runs: the `text` block after it or None, itself, and what it prints."""
     found = [m for m in _FENCE.finditer(page.read_text("utf-8")) if m[1] in RUN_LANGUAGES]
-    outputs = printed_by([Block(*m.groups()) for m in found], folder)
+    outputs = printed_by([Block(*m.groups()) for m in found], folder, more)
     return [
         (after if after and after[1] == "text" else None, block, printed)
         for block, after, printed in zip(found, [*found, None][1:], outputs, strict=True)
@@ -126,10 +130,36 @@ def shown_and_printed(page, folder):
     ]
 
 
-@pytest.mark.parametrize("name", [n for n, p in PAGES.items() if "```" in p.read_text("utf-8")])
+def with_blocks():
+    return [n for n, p in PAGES.items() if "```" in p.read_text("utf-8") and n != OTHERS]
+
+
+@pytest.mark.slow
+def test_environments_of_other_packages_go_all_the_way_to_a_report(tmp_path):
+    packages = tmp_path / "packages"
+    names = ["minigrid", "highway-env", "gym-classics", "pygame"]
+    subprocess.run(
+        [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", packages, *names],
+        check=True,
+    )
+    check_printed(OTHERS, tmp_path, packages)
+    reports = [path.parent.name for path in tmp_path.glob("working/results/*/report.html")]
+    assert sorted(reports) == ["empty", "empty-on-ray", "merge", "wind"]
+    tables = [
+        (tmp_path / "working" / "results" / name / "episodes.parquet").read_bytes()
+        for name in ("empty", "empty-on-ray")
+    ]
+    assert tables[0] == tables[1]
+
+
+@pytest.mark.parametrize("name", with_blocks())
 def test_what_a_page_shows_runs_and_prints_what_it_says(name, tmp_path):
+    check_printed(name, tmp_path)
+
+
+def check_printed(name, folder, more=""):
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    for shown, block, printed in shown_and_printed(PAGES[name], tmp_path):
+    for shown, block, printed in shown_and_printed(PAGES[name], folder, more):
         if shown or block[1] == "python":
             expected = shown[2] if shown else ""
             assert doctest.OutputChecker().check_output(expected, printed, flags), (
@@ -175,7 +205,9 @@ def test_every_named_experiment_file_is_valid_and_used(name, tmp_path):
         if named := _NAMED_TOML.match(block.text):
             assert any(named[1] in other.text for other in blocks if other.language in RUNNING)
             (tmp_path / named[1]).write_text(block.text, encoding="utf-8")
-            load_experiment(tmp_path / named[1])
+            # Pages make or install the modules that their files import.
+            if name != OTHERS and not tomllib.loads(block.text).get("imports"):
+                load_experiment(tmp_path / named[1])
 
 
 def anchors_of(page):

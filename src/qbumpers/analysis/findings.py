@@ -60,8 +60,8 @@ class LearnerFindings(NamedTuple):
     @property
     def decimals(self) -> int:
         """Decimals of its mean returns."""
-        ends = [f"{measure}_{part}" for measure in RETURNS for part in ("mean", "low", "high")]
-        return decimals_of(self.summary.select(ends).to_numpy().astype(float).ravel().tolist())
+        means = [f"{measure}_mean" for measure in RETURNS]
+        return decimals_of(self.summary.select(means).to_numpy().astype(float).ravel().tolist())
 
 
 class Sentences(NamedTuple):

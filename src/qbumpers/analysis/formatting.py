@@ -41,7 +41,8 @@ def decimals_of(numbers: Iterable[float | None]) -> int:
     Returns of everyday size keep one decimal, and lose it only if they differ by 10,000.
 
     Args:
-        numbers: those that are compared, with the ends of their intervals; None if unknown.
+        numbers: those that are compared; None if unknown. Ends of intervals are none of them: those
+            of few trials lie far apart.
 
     Returns:
         Decimals for `format_number`, negative if numbers differ by 100,000 or more.

@@ -16,6 +16,7 @@ import qbumpers
 from qbumpers.cli.console import (
     ERRORS,
     OUTPUT,
+    forget_warnings,
     in_one_line,
     print_in_any_encoding,
     print_warning,
@@ -60,6 +61,7 @@ def _main_options(
 def main() -> None:
     """Run the command line and exit with its status."""
     print_in_any_encoding()
+    forget_warnings()
     try:
         with warnings.catch_warnings():
             warnings.showwarning = print_warning

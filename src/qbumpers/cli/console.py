@@ -4,6 +4,7 @@ import codecs
 import contextlib
 import io
 import math
+import re
 import sys
 import warnings
 from collections.abc import Generator
@@ -43,9 +44,20 @@ def print_in_any_encoding() -> None:
             stream.reconfigure(errors="spelt-out")
 
 
+_warned: set[str] = set()
+
+
+def forget_warnings() -> None:
+    """Forget what was warned of, at the beginning of a command."""
+    _warned.clear()
+
+
 def print_warning(message: Warning | str, *_: Any) -> None:
-    """A warning in one line; in place of `warnings.showwarning`."""
-    ERRORS.print(f"warning: {escape(in_one_line(message))}", soft_wrap=True)
+    """A warning in one line, once per command; in place of `warnings.showwarning`."""
+    plain = in_one_line(re.sub(r"\x1b\[[0-9;]*m", "", str(message)))
+    if plain not in _warned:
+        _warned.add(plain)
+        ERRORS.print(f"warning: {escape(plain)}", soft_wrap=True)
 
 
 def in_one_line(message: object) -> str:

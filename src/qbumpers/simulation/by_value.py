@@ -32,15 +32,22 @@ def dumped(things: Any, modules: Iterable[str], alone: Iterable[str] = ()) -> by
 
 @contextmanager
 def _by_value(names: Iterable[str]) -> Iterator[None]:
-    """Within the block, what comes from these modules is pickled whole, not by its name."""
+    """Within the block, what comes from these modules, and no others, is pickled whole."""
     import cloudpickle
 
-    before = cloudpickle.list_registry_pickle_by_value() | {"__main__"}
-    modules = [sys.modules[name] for name in set(names) & sys.modules.keys() - before]
-    for module in modules:
-        cloudpickle.register_pickle_by_value(module)
+    before = cloudpickle.list_registry_pickle_by_value()
+    wanted = set(names) & sys.modules.keys() - {"__main__"}
+    _pickle_by_value(before, wanted)
     try:
         yield
     finally:
-        for module in modules:
-            cloudpickle.unregister_pickle_by_value(module)
+        _pickle_by_value(wanted, before)
+
+
+def _pickle_by_value(now: Iterable[str], wanted: Iterable[str]) -> None:
+    import cloudpickle
+
+    for name in set(now) - set(wanted):
+        cloudpickle.unregister_pickle_by_value(sys.modules[name])
+    for name in set(wanted) - set(now):
+        cloudpickle.register_pickle_by_value(sys.modules[name])

@@ -39,7 +39,8 @@ def home_of(name: str) -> Home:
         return Home("python")
     if file is not None:
         path = Path(file).resolve()
-        if any(path.is_relative_to(place) for place in _installed_places()):
+        places = [*_installed_places(), *_other_places(root)]
+        if any(path.is_relative_to(place) for place in places):
             versions = _versions(root)
             return Home("installed", versions) if versions else Home("own")
         standard = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
@@ -53,6 +54,17 @@ def _installed_places() -> list[Path]:
     places = [sysconfig.get_path("purelib"), sysconfig.get_path("platlib")]
     places += [*site.getsitepackages(), site.getusersitepackages()]
     return [Path(place).resolve() for place in dict.fromkeys(places)]
+
+
+def _other_places(root: str) -> list[Path]:
+    """Folders in which an installer put a package although Python does not name them.
+
+    One that is edited where it lies is in none of them: its list of files is elsewhere.
+    """
+    found = importlib.metadata.packages_distributions().get(root, [])
+    distributions = [importlib.metadata.distribution(name) for name in dict.fromkeys(found)]
+    installed = [each for each in distributions if each.read_text("RECORD") is not None]
+    return [Path(str(each.locate_file(""))).resolve() for each in installed]
 
 
 def _versions(root: str) -> dict[str, str]:

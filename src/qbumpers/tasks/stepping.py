@@ -17,7 +17,7 @@ from qbumpers.tasks.dynamics import CRASH, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.tasks.undoing import undo_of
 from qbumpers.tasks.wrapping import layers
 
-REVISION = 2
+REVISION = 1
 """Of `GymnasiumStepper`: raised when tasks that it steps give other numbers."""
 
 _NOTHING = object()

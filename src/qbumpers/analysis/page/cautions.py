@@ -67,12 +67,17 @@ def _few(trials: int, summary: pl.DataFrame) -> str:
     level = (1 + CONFIDENCE) / 2
     ends = summary.select("unassisted_low", "unassisted_high").drop_nulls().to_numpy()
     half = float(np.median(ends[:, 1] - ends[:, 0])) / 2
-    seen = format_roughly(np.sqrt(2) * half)
+    unseen = (
+        f"differences in unassisted return below about {format_roughly(np.sqrt(2) * half)} per "
+        "episode cannot be seen; "
+        if half > 0
+        else ""
+    )
     return (
         f"There are only {trials} trials per condition: a 95% interval of a mean reaches "
         f"{stdtrit(trials - 1, level):.1f} standard errors to each side, in place of "
-        f"{ndtri(level):.1f} with many trials; differences in unassisted return below about {seen} "
-        "per episode cannot be seen; and intervals from resampling tend to be too narrow below "
+        f"{ndtri(level):.1f} with many trials; {unseen}"
+        "and intervals from resampling tend to be too narrow below "
         f"{FEW_TRIALS} trials."
     )
 

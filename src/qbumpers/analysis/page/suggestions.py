@@ -7,6 +7,7 @@ import polars as pl
 
 from qbumpers.analysis.figures.style import readable
 from qbumpers.analysis.findings import Findings, LearnerFindings
+from qbumpers.analysis.page.cautions import FEW_TRIALS
 from qbumpers.analysis.page.headlines import named, overriding
 
 _MOST = 100  # times as many learners: nobody runs more to tell two conditions apart
@@ -43,7 +44,15 @@ def _to_tell_apart(about: LearnerFindings) -> Iterator[str]:
     if needed <= best.trials:  # these two are told apart: it is others that are not
         needed = 2.0 * best.trials
     if needed > _MOST * best.trials:
-        yield f"Do not try to find out {pair}{_with(about)}: they are too much alike to matter."
+        most = _MOST * best.trials
+        pair += _with(about)
+        yield (
+            f"Do not try to find out {pair}: they are so much alike that it would need more than "
+            f"{most:,} learners per condition."
+            if best.trials >= FEW_TRIALS
+            else f"To find out {pair}, run {FEW_TRIALS} learners per condition first: "
+            f"{best.trials} do not even tell how many are needed."
+        )
         return
     rounded = int(np.ceil(needed / 10) * 10)
     yield f"To find out {pair}{_with(about)}, run about {rounded:,} learners per condition."

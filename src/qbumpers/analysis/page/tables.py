@@ -22,8 +22,8 @@ def _of(row: Mapping[str, Any], measure: str, least: int = 1) -> Markup:
 
 def _decimals(table: pl.DataFrame, *measures: str) -> int:
     """Of numbers that are not returns: without any, unless they differ by little."""
-    ends = [f"{measure}_{part}" for measure in measures for part in ("mean", "low", "high")]
-    found = decimals_of(table.select(ends).to_numpy().astype(float).ravel().tolist())
+    means = [f"{measure}_mean" for measure in measures]
+    found = decimals_of(table.select(means).to_numpy().astype(float).ravel().tolist())
     return 0 if found == 1 else found
 
 
