@@ -55,6 +55,14 @@ def test_values_that_prefer_nothing_are_named(tmp_path):
     assert "the same for all actions in every state" in found[0]
 
 
+def test_an_estimated_table_is_named(tmp_path):
+    lake = {**LAKE, "arguments": {"is_slippery": False, "estimated": 9_000}}
+    run_into(tmp_path / "out", task=lake, trials=20, episodes=10, assistants=ALL)
+    results = load(tmp_path / "out")
+    [sentence] = doubts(find(results), results)
+    assert sentence.startswith("The task is an estimate of the environment from 9,000 of its steps")
+
+
 def test_values_of_another_discount_are_named(tmp_path):
     [sentence] = doubts_of(tmp_path, discount=0.8)
     assert "made with discount 0.8, and the task has discount 0.9" in sentence

@@ -29,6 +29,7 @@ def doubts(findings: Findings, results: Results) -> list[str]:
         Sentences; empty if there is no such doubt.
     """
     return [
+        *_of_an_estimate(results),
         *_of_the_discount(results),
         *_of_flat_values(results),
         *(sentence for about in findings.learners for sentence in _of_full_help(about)),
@@ -36,6 +37,17 @@ def doubts(findings: Findings, results: Results) -> list[str]:
         *_of_floors(results),
         *(sentence for about in findings.learners for sentence in _of_idle_assistants(about)),
     ]
+
+
+def _of_an_estimate(results: Results) -> Iterator[str]:
+    """A table of transitions that was estimated: learners are simulated in it, too."""
+    steps = results.experiment.task.arguments.get("estimated")
+    if isinstance(steps, int):
+        yield (
+            f"The task is an estimate of the environment from {steps:,} of its steps: learners "
+            "are simulated in the estimate, and the values are exact for it alone. Intervals here "
+            "are over learners, and know nothing of its error."
+        )
 
 
 def _of_the_discount(results: Results) -> Iterator[str]:
