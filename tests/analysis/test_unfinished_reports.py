@@ -115,8 +115,16 @@ def test_the_command_reports_it_and_a_finished_one_says_nothing_of_it(part, whol
     assert "Not finished" not in (whole / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("after", [1, 2, 4, 13])
-@pytest.mark.parametrize("common", [False, True])
+@pytest.mark.parametrize(
+    ("after", "common"),
+    [
+        (1, False),
+        (4, True),
+        *(pytest.param(*each, marks=pytest.mark.slow) for each in [
+            (1, True), (2, False), (2, True), (4, False), (13, False), (13, True),
+        ]),
+    ],
+)  # fmt: skip
 def test_a_run_is_reported_wherever_it_was_stopped(tmp_path, after, common):
     learners = [{"perception": ["transition", "observant"]}]
     several = [{"name": "none"}, BUMPERS]

@@ -4,6 +4,7 @@ import os
 import platform
 import subprocess
 import sys
+from typing import Any
 
 import numba
 import numpy as np
@@ -96,16 +97,16 @@ def test_a_transposed_matrix_is_contiguous():
     assert np.array_equal(turned, numbers.T)
 
 
-OTHERS = ["generic"]  # on x86-64 one without fused operations
-if platform.machine() == "x86_64":
-    OTHERS.append("haswell")  # registers half as wide as those of later ones
+OTHERS: list[Any] = ["generic"]  # on x86-64 one without fused operations
+if platform.machine() == "x86_64":  # registers half as wide as those of later ones
+    OTHERS.append(pytest.param("haswell", marks=pytest.mark.slow))
 
 
-def test_learners_have_the_same_bits_on_other_processors():
-    here = digests({})
+@pytest.mark.parametrize("processor", OTHERS)
+def test_learners_have_the_same_bits_on_other_processors(processor):
+    here, there = digests({}), digests({"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""})
     assert len(set(here)) == len(NETWORKS)
-    for processor in OTHERS:
-        assert digests({"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}) == here, processor
+    assert there == here
 
 
 def digests(settings):

@@ -90,6 +90,8 @@ CONDITIONS = {
     ),
 }
 SEED, TRIALS = 11, range(2, 5)
+# What a perception does is one table; two of them stand for all where a step is taken back.
+LONGER = {f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]}
 
 
 def plain_trial(condition, trial, seed=SEED):
@@ -100,7 +102,13 @@ def plain_trial(condition, trial, seed=SEED):
     ).run()
 
 
-@pytest.fixture(scope="module", params=CONDITIONS)
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=[pytest.mark.slow] if name in LONGER else [])
+        for name in CONDITIONS
+    ],
+)
 def condition(request):
     with pytest.MonkeyPatch.context() as patch:  # own rules are forgotten afterwards
         for name in ("_rules", "_rules_by_options"):
