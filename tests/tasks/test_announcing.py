@@ -70,7 +70,7 @@ def test_nothing_is_announced_if_nothing_is_shown():
 def test_a_key_that_was_shown_is_not_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        task_of(success_key="won", won="end")
+        assert task_of(success_key="won", won="end").events == {"success"}
 
 
 def test_keys_are_part_of_the_digest_unless_they_are_the_usual_ones():

@@ -13,9 +13,9 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from qbumpers.assistants.registry import register_assistant
+from qbumpers.assistants.registry import register_assistant, unchanged
 from qbumpers.compilation import compiled
-from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+from qbumpers.decisions import Decision, Model, Noise, Situation
 
 
 class AcceptOrRejectOptions(NamedTuple):
@@ -32,12 +32,6 @@ class AcceptOrRejectOptions(NamedTuple):
 def doing_nothing(options: AcceptOrRejectOptions, model: Model) -> int:
     """The action that does nothing."""
     return model.no_op
-
-
-@compiled
-def unchanged(memory: int, step: Step, options: AcceptOrRejectOptions) -> int:
-    """The same action."""
-    return memory
 
 
 @register_assistant(

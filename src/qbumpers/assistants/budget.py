@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from qbumpers.assistants.dispatch import decide, declined, observe, start, undoes
+from qbumpers.assistants.dispatch import decide, declined, observe, overrides, start
 from qbumpers.assistants.registry import Options, register_assistant
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step
@@ -90,12 +90,11 @@ def budget(
     """
     decision = decide(situation, noise, options.of, memory.of)
     spent = memory.spent if situation.episode == memory.episode else 0
-    overrides = decision.action != situation.proposed or undoes(decision)
     exhausted = (
         _exhausted(spent, options.per_episode)
         or _exhausted(memory.in_all, options.in_all)
         or _above(memory.in_all + 1, options.share, memory.steps + 1)
     )
-    if overrides and exhausted:
+    if overrides(decision, situation.proposed) and exhausted:
         return declined(decision, situation.proposed)
     return decision

@@ -13,10 +13,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.assistants.registry import register_assistant
+from qbumpers.assistants.registry import register_assistant, unchanged
 from qbumpers.choice import best_value, only, pick, worst_value
 from qbumpers.compilation import compiled
-from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+from qbumpers.decisions import Decision, Model, Noise, Situation
 
 
 class ClosestAcceptableOptions(NamedTuple):
@@ -34,12 +34,6 @@ class ClosestAcceptableOptions(NamedTuple):
 def distances(options: ClosestAcceptableOptions, model: Model) -> np.ndarray:
     """The distance between actions, float64 [A, A]."""
     return model.distance.copy()
-
-
-@compiled
-def unchanged(memory: np.ndarray, step: Step, options: ClosestAcceptableOptions) -> np.ndarray:
-    """The same distances: no step changes them."""
-    return memory
 
 
 @register_assistant(

@@ -59,6 +59,12 @@ def with_probability(decision: Decision, probability: float) -> Decision:
 
 
 @inlined
+def overrides(decision: Decision, proposed: int) -> bool:
+    """Whether a decision executes another action than the proposed one, or undoes it."""
+    return decision.action != proposed or undoes(decision)
+
+
+@inlined
 def declined(decision: Decision, proposed: int) -> Decision:
     """The proposed action in place of a decision, for rules over rules.
 

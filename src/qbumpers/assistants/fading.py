@@ -17,8 +17,8 @@ from qbumpers.assistants.dispatch import (
     decide,
     executing,
     observe,
+    overrides,
     start,
-    undoes,
     with_probability,
 )
 from qbumpers.assistants.registry import Options, register_assistant
@@ -60,7 +60,6 @@ def fading(situation: Situation, noise: Noise, options: FadingOptions, memory: A
     """
     decision = decide(situation, noise, options.of, memory)
     probability = decision.probability * 2.0 ** (-situation.episode / options.half_life)
-    overrides = decision.action != situation.proposed or undoes(decision)
-    if overrides and noise.coin >= probability:
+    if overrides(decision, situation.proposed) and noise.coin >= probability:
         return executing(decision, situation.proposed, probability)
     return with_probability(decision, probability)

@@ -13,8 +13,8 @@ from qbumpers.assistants.dispatch import (
     decide,
     executing,
     observe,
+    overrides,
     start,
-    undoes,
     with_probability,
 )
 from qbumpers.assistants.registry import Options, register_assistant
@@ -79,6 +79,6 @@ def hysteresis(
     best = best_value(values)
     if not held or values[proposed] >= best:
         return decision
-    if decision.action != proposed or undoes(decision):
+    if overrides(decision, proposed):
         return with_probability(decision, 1.0)
     return executing(decision, pick(values, best, noise.tie), 1.0)

@@ -34,10 +34,10 @@ def overridden_with(
     """An override of a proposal worse than the candidate, with a probability.
 
     Args:
-        situation: of the decision.
+        situation: what is proposed, and what each action is worth.
         noise: of the decision; its coin decides.
         candidate: value of the action that an override executes.
-        probability: of the override.
+        probability: with which a worse proposal is overridden.
     """
     if situation.values[situation.proposed] >= candidate:
         return Decision(situation.proposed, 0.0)

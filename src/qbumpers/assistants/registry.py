@@ -6,8 +6,8 @@ from functools import partial
 from typing import Annotated, Any
 
 from qbumpers.assistants.compiling import Kind, compile_functions
-from qbumpers.compilation import is_compiled, is_of_package
-from qbumpers.decisions import Decision
+from qbumpers.compilation import compiled, is_compiled, is_of_package
+from qbumpers.decisions import Decision, Step
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.registration import (
     check_arguments,
@@ -75,6 +75,12 @@ class Rule:
     def over_a_rule(self) -> bool:
         """Whether it is a rule over a rule: whether its options have a field `of`."""
         return "of" in self.options_type._fields  # type: ignore[attr-defined]
+
+
+@compiled
+def unchanged(memory: Any, step: Step, options: Any) -> Any:
+    """The same memory: `observe` of a rule that remembers only what it was given at its start."""
+    return memory
 
 
 _rules: dict[str, Rule] = {}

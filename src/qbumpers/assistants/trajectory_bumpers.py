@@ -15,10 +15,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.assistants.registry import register_assistant
+from qbumpers.assistants.registry import register_assistant, unchanged
 from qbumpers.choice import best_value, only, pick
 from qbumpers.compilation import compiled
-from qbumpers.decisions import Decision, Model, Noise, Situation, Step
+from qbumpers.decisions import Decision, Model, Noise, Situation
 from qbumpers.errors import RequestError
 
 
@@ -84,12 +84,6 @@ def farthest(options: TrajectoryBumpersOptions, model: Model) -> np.ndarray:
                     away = distance[dynamics.next_state[index]]
                     found[state, action] = max(found[state, action], away)
     return found
-
-
-@compiled
-def unchanged(memory: np.ndarray, step: Step, options: TrajectoryBumpersOptions) -> np.ndarray:
-    """The same distances: no step changes them."""
-    return memory
 
 
 @register_assistant(

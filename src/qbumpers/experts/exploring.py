@@ -96,7 +96,7 @@ class Snapshots:
 
     Args:
         task: what they are judged by.
-        steps: of the training.
+        steps: how long the training is.
         now: makes the values of the moment.
     """
 

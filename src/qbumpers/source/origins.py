@@ -6,7 +6,7 @@ import site
 import sys
 import sysconfig
 import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,14 +39,18 @@ def home_of(name: str) -> Home:
         return Home("python")
     if file is not None:
         path = Path(file).resolve()
-        places = [*_installed_places(), *_other_places(root)]
-        if any(path.is_relative_to(place) for place in places):
+        standard = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
+        installed = _is_in(path, _installed_places())
+        if not installed and _is_in(path, [Path(place).resolve() for place in standard]):
+            return Home("python")
+        if installed or _is_in(path, _other_places(root)):
             versions = _versions(root)
             return Home("installed", versions) if versions else Home("own")
-        standard = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
-        if any(path.is_relative_to(Path(place).resolve()) for place in standard):
-            return Home("python")
     return Home("own")
+
+
+def _is_in(path: Path, places: Iterable[Path]) -> bool:
+    return any(path.is_relative_to(place) for place in places)
 
 
 @functools.cache
@@ -61,8 +65,7 @@ def _other_places(root: str) -> list[Path]:
 
     One that is edited where it lies is in none of them: its list of files is elsewhere.
     """
-    found = importlib.metadata.packages_distributions().get(root, [])
-    distributions = [importlib.metadata.distribution(name) for name in dict.fromkeys(found)]
+    distributions = [importlib.metadata.distribution(name) for name in _distributions(root)]
     installed = [each for each in distributions if each.read_text("RECORD") is not None]
     return [Path(str(each.locate_file(""))).resolve() for each in installed]
 
@@ -71,8 +74,18 @@ def _versions(root: str) -> dict[str, str]:
     try:
         return {root: importlib.metadata.version(root)}
     except importlib.metadata.PackageNotFoundError:
-        names = importlib.metadata.packages_distributions().get(root, [])
-        return {name: importlib.metadata.version(name) for name in sorted(set(names))}
+        return {name: importlib.metadata.version(name) for name in _distributions(root)}
+
+
+def _distributions(root: str) -> list[str]:
+    """Names of the distributions that a top-level module belongs to."""
+    return sorted(set(_all_distributions(tuple(sys.path)).get(root, [])))
+
+
+@functools.lru_cache(maxsize=1)
+def _all_distributions(places: tuple[str, ...]) -> Mapping[str, list[str]]:
+    """Of every module in those places; reading what is installed takes a third of a second."""
+    return importlib.metadata.packages_distributions()
 
 
 def version_of(module: str) -> dict[str, str]:

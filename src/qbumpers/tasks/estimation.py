@@ -27,7 +27,7 @@ class Estimate(NamedTuple):
     """What a table was estimated from; a pair is a state and an action.
 
     Attributes:
-        steps: of the environment.
+        steps: how many the environment was stepped.
         visits: int64 [S, A], how often each pair was tried.
         starts: int64 [S], how many episodes began in each state.
         met: bool [S], states in which an episode can go on, as far as was seen; the others were

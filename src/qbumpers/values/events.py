@@ -62,7 +62,7 @@ def event_values(task: TabularTask, name: str) -> TabularValues:
 
     Args:
         task: which is solved.
-        name: of the row.
+        name: which row.
 
     Raises:
         RequestError: if the task announces no such events.

@@ -22,15 +22,15 @@ class Point(NamedTuple):
     """A condition in a panel; places in its units, from the upper left.
 
     Attributes:
-        x: of the mean.
-        y: of the mean.
+        x: where the mean assisted return lies.
+        y: where the mean unassisted return lies.
         left: end of the bar of the assisted return.
         right: the other end.
         top: end of the bar of the unassisted return.
         bottom: the other end.
         colour: as "#rrggbb".
         pareto: whether it is Pareto-optimal.
-        name: of the condition.
+        name: the condition in words.
         numbers: what it returned, in lines.
     """
 
