@@ -83,12 +83,12 @@ def write_report(
     pictures = []
     for drawing in drawings(results, findings):
         advance(f"figure {drawing.name}")
-        pictures.append(_picture(folder / FIGURES, drawing))
+        pictures.append(picture(folder / FIGURES, drawing))
     advance(REPORT)
     text = page(folder, results, findings, pictures, tables)
     _write(folder / REPORT, text.encode())
     _clear(folder, {*tables})
-    _clear_figures(folder / FIGURES, {picture.name for picture in pictures})
+    _clear_figures(folder / FIGURES, {each.name for each in pictures})
     return findings
 
 
@@ -154,8 +154,19 @@ def _flat(about: LearnerFindings, matched: str, regret: Regret) -> dict[str, Any
     }
 
 
-def _picture(folder: Path, drawing: Drawing) -> Picture:
-    """Draw a figure and write it, with the numbers behind it."""
+def picture(folder: Path, drawing: Drawing) -> Picture:
+    """Draw a figure and write it as PNG and SVG, with the numbers behind it as CSV.
+
+    Args:
+        folder: where the files go.
+        drawing: what is drawn.
+
+    Returns:
+        The figure, for a page.
+
+    Raises:
+        StoreError: if a file cannot be written.
+    """
     numbers = drawing.numbers.with_columns(pl.selectors.float().round_sig_figs(8)).write_csv()
     _write(folder / f"{drawing.name}.csv", numbers.encode())
     with _without_collection():
