@@ -14,13 +14,15 @@ from qbumpers.experiments.sources import make_experiment
 from qbumpers.tasks import TabularTask
 from qbumpers.tasks.registry import task_names
 
-TASKS = ("cliff-walking", "larger-cliff", "windy-gridworld", "frozen-lake", "taxi")
+TASKS = (
+    "cliff-walking", "larger-cliff", "windy-gridworld", "frozen-lake", "random-mdp", "inventory",
+)  # fmt: skip
 """Tasks that are compared if none are named."""
 
 EVERY = "all"
 """Stands for every registered task with a table of transitions that needs no arguments."""
 
-LEARNERS = ("q-learning", "q-learning/perception=observant", "sarsa")
+LEARNERS = ("q-learning", "q-learning/perception=observant", "softmax-q-learning")
 """Learners that are compared if none are named."""
 
 ANCHOR_TRIALS = 1000

@@ -52,17 +52,18 @@ def run_cases(
         report: called with the progress after each cell.
 
     Raises:
-        RequestError: if the folder holds other cases of the same name, or another run is writing
-            to it.
+        RequestError: if a learner does not suit a task, the folder holds other cases of the same
+            name, or another run is writing to it.
         StoreError: if results cannot be written; finished cells stay.
     """
     place = Path(folder)
+    parts = [(f"{case.folder}/{ANCHOR_FOLDER}", case.anchors) for case in cases]
+    parts += [(f"{case.folder}/{METHOD_FOLDER}", case.methods) for case in cases]
+    plans = {name: make_plan(design) for name, design in parts}
     write_atomically(place / COMPARISON, lambda path: path.write_text(noted(cases), "utf-8"))
-    work = [(case, ANCHOR_FOLDER, case.anchors) for case in cases]
-    work += [(case, METHOD_FOLDER, case.methods) for case in cases]
-    sizes = [design.trials * design.condition_count() for _, _, design in work]
-    before = ComparisonProgress(0, sum(sizes), 0, [], [])
-    for case, part, design in work:
+    total = sum(design.trials * design.condition_count() for _, design in parts)
+    before = ComparisonProgress(0, total, 0, [], [])
+    for name, plan in plans.items():
         now = before
 
         def advance(done: RunProgress, before: ComparisonProgress = before) -> None:
@@ -76,8 +77,7 @@ def run_cases(
             )
             report(now)
 
-        place_of_part = place / case.folder / part
-        run_experiment(make_plan(design), place_of_part, backend=backend, report=advance)
+        run_experiment(plan, place / name, backend=backend, report=advance)
         before = now
 
 
