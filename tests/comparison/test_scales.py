@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from qbumpers.comparison.scales import Scales, best_return, reachable, thresholds
-from qbumpers.tasks import TabularTask, make_task
+from qbumpers.tasks import TabularTask
+from qbumpers.tasks.cliff_walking import cliff_walking
+from qbumpers.tasks.toy_text import frozen_lake
 from qbumpers.values import solve
 
 
@@ -44,13 +46,13 @@ def test_the_best_return_is_undiscounted_and_within_the_limit(discount, limit, e
 
 
 def test_the_best_return_of_cliff_walking_is_the_value_of_its_start():
-    task = make_task("cliff-walking")
+    task = cliff_walking()
     values = solve(task).table
     assert best_return(task, values) == pytest.approx(values[36].max()) == 87
 
 
 def test_the_best_return_of_a_slippery_lake_is_what_its_best_policy_gets():
-    task = make_task("frozen-lake")
+    task = frozen_lake()
     values = solve(task).table
     generator, wins = np.random.default_rng(0), 0
     for _ in range(2000):
