@@ -5,6 +5,7 @@
 """
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from qbumpers.comparison.results import NARROW
 from qbumpers.comparison.running import COMPARISON
 
 DATA = DOCS / "data" / "comparison"
-_DIGITS = 4
+_DIGITS, _COLOURS = 4, 64
 _NOTED = "comparison.json"
 
 
@@ -42,9 +43,12 @@ def make(folder: Path) -> None:
     tables = read_tables(DATA)
     images = folder / "images"
     images.mkdir(parents=True, exist_ok=True)
-    shown = [(drawing, f"comparison-{drawing.name}") for drawing in drawings(tables)]
+    shown = [
+        (drawing, "comparison-" + re.sub(r"[^\w-]", "-", drawing.name))
+        for drawing in drawings(tables)
+    ]
     for drawing, name in shown:
-        keep(drawing.draw(), images, name)
+        keep(drawing.draw(), images, name, _COLOURS)
     page = template("choosing.md.j2")
     text = page.render(
         noted=json.loads((DATA / _NOTED).read_text("utf-8")),

@@ -308,6 +308,15 @@ def test_the_reproduction_page_says_what_its_script_finds(tmp_path):
 
 
 @pytest.mark.slow
+def test_the_page_on_choosing_says_what_the_kept_tables_do(tmp_path):
+    """The committed page, pictures aside, is exactly what the script writes."""
+    pictures = make("make_comparison.py", tmp_path)
+    fresh = (tmp_path / "choosing.md").read_text(encoding="utf-8")
+    assert (DOCS / "choosing.md").read_text(encoding="utf-8") == fresh
+    assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
+
+
+@pytest.mark.slow
 def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
     pictures = make("make_pictures.py", tmp_path)
     assert pictures

@@ -16,14 +16,15 @@ from qbumpers.comparison.methods import (
 from qbumpers.comparison.scales import Scales
 from qbumpers.errors import RequestError
 from qbumpers.simulation import make_condition
-from qbumpers.tasks import make_task
+from qbumpers.tasks import TabularTask, make_task
+from tests.narrowing import of_kind
 
 TASKS = ("cliff-walking", "frozen-lake", "random-mdp", "taxi", "inventory")
 
 
 @pytest.fixture(scope="module")
 def scales():
-    return {name: Scales(make_task(name), 100) for name in TASKS}
+    return {name: Scales(of_kind(TabularTask, make_task(name)), 100) for name in TASKS}
 
 
 def test_every_assistant_of_the_package_is_compared():

@@ -8,6 +8,7 @@ import pytest
 from qbumpers.comparison.methods import BASELINE
 from qbumpers.comparison.results import CaseResults, Comparison
 from qbumpers.comparison.scores import covered, find_tables
+from qbumpers.comparison.sentences import overall
 from tests.comparison.made_up import case_results
 
 
@@ -55,6 +56,16 @@ def test_a_case_without_a_conflict_is_not_scored(tables):
         "easy": True, "hard": True, "same": False,
     }  # fmt: skip
     assert "same" not in tables.scores["task"].to_list()
+
+
+def test_a_method_that_returns_more_than_any_policy_is_not_scored():
+    case = case_results("paying", {BASELINE: around(4, 4), "undo": around(12, 4)})
+    methods = {name: {"dial": "", "formula": ""} for name in (BASELINE, "undo")}
+    found = find_tables(Comparison("1", "", methods, [case]))
+    assert found.scores["method"].to_list() == [BASELINE]
+    (said,) = [each for each in overall(found) if each.startswith("undo is not scored")]
+    assert "paying with q-learning" in said
+    assert "12.00 against 10.00" in said
 
 
 def test_aggregates_are_over_the_scored_cases(tables):

@@ -55,7 +55,7 @@ class Case(NamedTuple):
         anchors: the experiment that reference points come from.
         methods: the experiment with every setting of every method.
         settings: of the conditions of `methods`, in their order.
-        best: the mean return of a best policy, in reward units.
+        best: the largest mean return that any policy has, in reward units.
         spread: of Q*, in reward units.
         left_out: why the task cannot carry a method, by its name.
     """
@@ -181,7 +181,7 @@ def _case(
             Setting(name, place, each.condition)
             for (name, place), each in zip(numbered, methods.conditions(), strict=True)
         ],
-        best=best_return(scales.task, scales.values),
+        best=best_return(scales.task),
         spread=scales.spread,
         left_out={name: reason for name, reason in reasons.items() if reason},
     )

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.analysis.measures import trial_measures, trial_samples
+from qbumpers.analysis.statistics import mean_interval
 from qbumpers.comparison.running import ANCHOR_FOLDER, COMPARISON, METHOD_FOLDER
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import Experiment
@@ -28,7 +29,7 @@ class CaseResults(NamedTuple):
         task: its name.
         learner: a kind, with what differs from its defaults.
         experiment: as run.
-        best: the mean return of a best policy, in reward units.
+        best: the largest mean return that any policy has, in reward units.
         spread: of Q*, in reward units.
         left_out: why the task cannot carry a method, by its name.
         anchors: float64 [T, 3] of `none` and of `maximal`, the `MEASURES` of each trial.
@@ -62,6 +63,14 @@ class CaseResults(NamedTuple):
         anchors = (self.anchors["none"][:, 1], self.anchors["maximal"][:, 2])
         errors = [each.std(ddof=1) / np.sqrt(self.experiment.trials) for each in anchors]
         return bool((sides > np.maximum(NARROW * self.spread, 3 * np.array(errors))).all())
+
+    def beyond(self, method: str) -> bool:
+        """Whether some setting of a method returns more than any policy, surely.
+
+        One that takes steps back can: their rewards count.
+        """
+        lowest = [mean_interval(trials[:, 1]).low for trials in self.methods[method]]
+        return max(lowest) > self.best + 1e-9
 
 
 class Comparison(NamedTuple):

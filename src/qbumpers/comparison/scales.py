@@ -22,26 +22,23 @@ def reachable(task: TabularTask) -> np.ndarray:
         found = further
 
 
-def best_return(task: TabularTask, values: np.ndarray) -> float:
-    """The mean return of a best policy, as returns are measured.
+def best_return(task: TabularTask) -> float:
+    """The largest mean return that any policy has, as returns are measured.
 
     It is V*(s_0), averaged over the starts, but undiscounted and within the step limit, as the
     returns of episodes are; the same number if the discount is 1 and the limit does not bind.
 
     Args:
         task: with a table of transitions.
-        values: Q*, float64 [S, A].
 
     Returns:
         The return, in reward units.
     """
-    best = values >= values.max(axis=1, keepdims=True)
-    weights = (best / best.sum(axis=1, keepdims=True))[:, :, np.newaxis] * task.probability
-    reward = (weights * task.reward).sum(axis=(1, 2))
-    going_on = np.where(task.terminated, 0.0, weights)
+    reward = (task.probability * task.reward).sum(axis=2)
+    going_on = np.where(task.terminated, 0.0, task.probability)
     value = np.zeros(task.states)
     for _ in range(task.episode_limit):
-        value = reward + (going_on * value[task.next_state]).sum(axis=(1, 2))
+        value = (reward + (going_on * value[task.next_state]).sum(axis=2)).max(axis=1)
     return float(task.start @ value)
 
 

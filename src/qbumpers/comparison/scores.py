@@ -41,7 +41,8 @@ class Tables(NamedTuple):
             `unassisted_lead` are minus those of the bumpers (all of a case and share hold at once).
         scores: a row per case and method: settings, normalised `hypervolume`, `advantage` over the
             bumpers (all of a case hold at once), rank, and `largest`, the share of resamples in
-            which it covers most. Only comparable cases.
+            which it covers most. Only comparable cases, and in these only methods that return no
+            more than any policy.
         aggregates: a row per method over its comparable cases: cases, `iqm`, `median`, `rank`,
             `improvement` (the probability that a run exceeds one of the bumpers) and `lead` (its
             interquartile mean minus that of the bumpers in the same cases; all hold at once).
@@ -186,12 +187,10 @@ class _CaseScores(NamedTuple):
 
 def _scores(case: CaseResults, generator: np.random.Generator) -> _CaseScores:
     """Scores of every method in a case."""
-    reference, best, names = case.reference, case.best, list(case.methods)
-    means = {name: samples[..., 1:].mean(axis=1) for name, samples in case.methods.items()}
-    resampled = {
-        name: resampled_means([*samples[..., 1:]], generator)
-        for name, samples in case.methods.items()
-    }
+    reference, best = case.reference, case.best
+    returns = {n: s[..., 1:] for n, s in case.methods.items() if not case.beyond(n)}
+    names, means = list(returns), {name: each.mean(axis=1) for name, each in returns.items()}
+    resampled = {name: resampled_means([*each], generator) for name, each in returns.items()}
     areas = {name: covered(resampled[name], reference, best) for name in names}
     unknown = any(np.isnan(points).any() for points in resampled.values())
     replicates = np.stack([areas[name] for name in names], axis=-1)
@@ -211,7 +210,7 @@ def _scores(case: CaseResults, generator: np.random.Generator) -> _CaseScores:
         }
         for place, name in enumerate(names)
     ]
-    runs = {name: _run_scores(samples, case) for name, samples in case.methods.items()}
+    runs = {name: _run_scores(each, case) for name, each in returns.items()}
     return _CaseScores(rows, runs, dict(zip(names, ranks.T, strict=True)))
 
 
@@ -248,11 +247,11 @@ def _advantage(
     )
 
 
-def _run_scores(samples: np.ndarray, case: CaseResults) -> np.ndarray:
-    """Normalised hypervolume of each run of a case, its trials dealt to runs; float64 [R]."""
-    trials = samples.shape[1]
+def _run_scores(returns: np.ndarray, case: CaseResults) -> np.ndarray:
+    """Scores [R] of runs of a method, which its trials, float64 [K, T, 2], are dealt to."""
+    trials = returns.shape[1]
     runs = min(RUNS, trials)
-    dealt = samples[:, : trials // runs * runs, 1:].reshape(len(samples), runs, -1, 2)
+    dealt = returns[:, : trials // runs * runs].reshape(len(returns), runs, -1, 2)
     return covered(dealt.mean(axis=2).swapaxes(0, 1), case.reference, case.best)
 
 

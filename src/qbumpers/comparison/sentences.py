@@ -23,7 +23,7 @@ def overall(tables: Tables) -> list[str]:
     Args:
         tables: from `find_tables`.
     """
-    return [*_scored(tables), *_without_conflict(tables)]
+    return [*_scored(tables), *_without_conflict(tables), *_beyond_the_best(tables)]
 
 
 def _scored(tables: Tables) -> list[str]:
@@ -33,7 +33,7 @@ def _scored(tables: Tables) -> list[str]:
     order = tables.aggregates.filter(cases=every).sort("iqm_mean", descending=True)
     best = order.row(0, named=True)
     said = [
-        f"Of the methods that every one of the {counted(every, 'comparable case')} can carry, "
+        f"Of the methods that are scored in each of {counted(every, 'comparable case')}, "
         f"{_name(best)} covers most: {_number(best, 'iqm')} of the box, by the interquartile mean."
     ]
     bumpers = tables.aggregates.filter(method=BASELINE)
@@ -56,6 +56,24 @@ def _without_conflict(tables: Tables) -> list[str]:
         + _listed([_case(row) for row in rows])
         + ": a side of the box, from no assistance or from maximal assistance to the best return, "
         "is narrower than a tenth of the spread of Q* or than chance. No method is scored there."
+    ]
+
+
+def _beyond_the_best(tables: Tables) -> list[str]:
+    """Methods that return more than any policy, which are not scored where they do."""
+    cases = tables.cases.filter("comparable").select("task", "learner", "best")
+    rows = (
+        tables.points.join(cases, on=["task", "learner"], maintain_order="left")
+        .filter(pl.col("assisted_low") > pl.col("best") + 1e-9)
+        .sort("assisted_mean", descending=True)
+        .unique(["method", "task", "learner"], keep="first", maintain_order=True)
+    )
+    return [
+        f"{readable(method)} is not scored in {_listed([_case(row) for row in part])}: it returns "
+        f"more than any policy there, up to {format_number(part[0]['assisted_mean'], 2)} against "
+        f"{format_number(part[0]['best'], 2)}, as steps that are taken back pay, too."
+        for method in rows["method"].unique(maintain_order=True)
+        for part in [rows.filter(method=method).rows(named=True)]
     ]
 
 
@@ -116,16 +134,24 @@ def by_learner(tables: Tables) -> dict[str, str]:
             .sort("hypervolume_mean", descending=True)
         )
         best = [
-            f"{_name(row)} ({format_number(row['hypervolume_mean'], 2)})"
+            f"{_name(row)} ({format_number(row['hypervolume_mean'], 2)}{_ahead_in(part, row)})"
             for row in means.head(3).rows(named=True)
         ]
         certain = part.filter(pl.col("largest") >= 0.95).rows(named=True)
-        said = f"On average over {counted(cases, 'task')}, {_listed(best)} cover most."
+        said = f"On average over {counted(cases, 'task')}, these cover most: {_listed(best)}."
         if certain:
             winners = [f"{_name(row)} in {row['task']}" for row in certain]
             said += f" The largest in at least 95% of resamples: {_listed(winners)}."
         found[str(part["learner"][0])] = said
     return found
+
+
+def _ahead_in(part: pl.DataFrame, row: Row) -> str:
+    """In how many tasks a method covers clearly more than the bumpers; empty for these."""
+    own = part.filter(method=row["method"])
+    if row["method"] == BASELINE or own["advantage_mean"].null_count():
+        return ""
+    return f", clearly more than {NAMES[BASELINE]} in {len(_more(own, 'advantage'))} of them"
 
 
 def at_shares(tables: Tables) -> list[str]:
@@ -236,7 +262,9 @@ def _case(row: Row) -> str:
 def _number(row: Row | pl.DataFrame, name: str) -> str:
     """A number with its interval, of a row or of a table of one row."""
     values = row.row(0, named=True) if isinstance(row, pl.DataFrame) else row
-    mean, low, high = (format_number(values[f"{name}_{end}"], 2) for end in ("mean", "low", "high"))
+    numbers = [values[f"{name}_{end}"] for end in ("mean", "low", "high")]
+    hidden = any(number and not round(number, 2) for number in numbers)
+    mean, low, high = (format_number(number, 3 if hidden else 2) for number in numbers)
     return mean if values[f"{name}_low"] is None else f"{mean} [{low}, {high}]"
 
 
