@@ -16,8 +16,7 @@ from writing import DOCS, template
 from qbumpers.analysis.figures.style import NAMES
 from qbumpers.comparison import sentences
 from qbumpers.comparison.figures import drawings
-from qbumpers.comparison.matched import SHARES
-from qbumpers.comparison.page import reach_table
+from qbumpers.comparison.page import floors_table, shares_table
 from qbumpers.comparison.report import read_tables
 from qbumpers.comparison.results import NARROW
 from qbumpers.comparison.running import COMPARISON
@@ -55,9 +54,9 @@ def make(folder: Path) -> None:
         tables=tables,
         sentences=sentences,
         names=NAMES,
-        shares=SHARES,
         narrow=NARROW,
-        reach=reach_table(tables).rows,
+        at_shares=shares_table(tables),
+        at_floors=floors_table(tables),
         figures=[(drawing.kind, drawing.label, name) for drawing, name in shown],
     )
     (folder / "choosing.md").write_text(text, encoding="utf-8")

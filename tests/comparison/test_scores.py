@@ -95,3 +95,25 @@ def test_a_few_trials_have_no_interval_but_a_number():
     row = found.scores.row(0, named=True)
     assert math.isfinite(row["hypervolume_mean"])
     assert row["hypervolume_low"] is None
+
+
+def test_what_is_learned_at_a_floor_of_performance_is_read_off_a_frontier():
+    methods = {BASELINE: [(0.1, 6, 4), (0.3, 9.02, 2)], "undo": [(0.1, 6, 8), (0.3, 9.02, 1)]}
+    made = {name: {"dial": "", "formula": ""} for name in methods}
+    found = find_tables(Comparison("1", "", made, [case_results("one", methods)])).floors
+    rows = {(row["method"], row["floor"]): row for row in found.rows(named=True)}
+    middle, high = (7.5 - 6) / 3.02, (9 - 6) / 3.02  # of the way between the two settings
+    expected = {
+        (BASELINE, 0.5): 4,
+        (BASELINE, 0.75): 4 - 2 * middle,
+        (BASELINE, 0.9): 4 - 2 * high,
+        ("undo", 0.5): 8,
+        ("undo", 0.75): 8 - 7 * middle,
+        ("undo", 0.9): 8 - 7 * high,
+    }
+    for key, learned in expected.items():
+        assert rows[key]["unassisted_mean"] == pytest.approx(learned, abs=0.02), key
+    for floor, sign in ((0.5, 1), (0.75, 1), (0.9, -1)):
+        row = rows["undo", floor]
+        assert sign * row["unassisted_lead_low"] > 0 < sign * row["unassisted_lead_high"]
+    assert found.filter(method=BASELINE)["unassisted_lead_mean"].null_count() == 3

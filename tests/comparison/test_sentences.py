@@ -63,7 +63,9 @@ def test_shares_that_are_out_of_reach_are_counted(tables):
 
 
 def test_ahead_and_behind_at_equal_shares(tables):
-    counts = {(r["share"], r["method"]): r for r in sentences.both_ways(tables).rows(named=True)}
+    counts = {
+        (r["share"], r["method"]): r for r in sentences.versus_at_shares(tables).rows(named=True)
+    }
     assert counts[0.2, "undo"]["ahead"] == counts[0.2, "undo"]["behind"] == 1
     assert counts[0.2, "correct"]["ahead"] == counts[0.2, "correct"]["behind"] == 0
     assert counts[0.1, "undo"]["cases"] == 1
@@ -75,3 +77,15 @@ def test_what_is_left_out_is_said_with_its_reason(tables):
     assert sentences.left_out(tables) == [
         "shield is left out of easy, hard and same: the task announces no crash."
     ]
+
+
+def test_who_teaches_more_at_equal_performance_in_most_cases():
+    better = {BASELINE: [(0.3, 8, 2), (0.1, 6, 4)], "undo": [(0.3, 8, 6), (0.1, 6, 8)]}
+    cases = [case_results(name, better) for name in ("one", "two")]
+    methods = {name: {"dial": "", "formula": ""} for name in (BASELINE, "undo")}
+    said = sentences.at_floors(find_tables(Comparison("1", "", methods, cases)))
+    assert [each.partition(",")[0] for each in said] == [
+        f"If assisted return must be {floor} of the way from no assistance to the best"
+        for floor in ("50%", "75%")
+    ]
+    assert all("undo (2 of 2) teaches clearly more in most" in each for each in said)

@@ -83,7 +83,7 @@ def drawings(tables: Tables) -> list[Drawing]:
 
 
 def normalised(tables: Tables) -> pl.DataFrame:
-    """Returns at matched shares, over comparable cases, on scales from the reference to the best.
+    """Returns at matched shares, over scored cases, on scales from the reference to the best.
 
     Args:
         tables: from `find_tables`.
@@ -92,8 +92,10 @@ def normalised(tables: Tables) -> pl.DataFrame:
         A row per share and method: share, method, cases (that it reaches), of (that it has),
         assisted and unassisted, interquartile means; 0 is the reference, 1 the best return.
     """
-    cases = tables.cases.filter("comparable")
-    matched = tables.matched.join(cases, on=["task", "learner"], maintain_order="left")
+    scored = tables.scores.select("task", "learner", "method")
+    matched = tables.matched.join(
+        scored, on=["task", "learner", "method"], maintain_order="left"
+    ).join(tables.cases, on=["task", "learner"], maintain_order="left")
     columns = {
         measure: (pl.col(f"{measure}_mean") - pl.col(f"reference_{measure}"))
         / (pl.col("best") - pl.col(f"reference_{measure}"))

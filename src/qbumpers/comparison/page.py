@@ -9,7 +9,6 @@ from qbumpers.analysis.formatting import decimals_of, format_number, format_shar
 from qbumpers.analysis.page.elements import Column, Table, interval
 from qbumpers.analysis.page.layout import Picture, data_url, page_environment
 from qbumpers.comparison import sentences
-from qbumpers.comparison.matched import SHARES
 from qbumpers.comparison.results import NARROW, Comparison
 from qbumpers.comparison.scores import RUNS, Tables
 
@@ -44,7 +43,8 @@ def page(comparison: Comparison, tables: Tables, pictures: Sequence[Picture]) ->
         runs=RUNS,
         narrow=NARROW,
         aggregates_table=aggregates_table,
-        reach_table=reach_table,
+        shares_table=shares_table,
+        floors_table=floors_table,
         methods_table=methods_table,
         cases_table=cases_table,
     )
@@ -76,24 +76,39 @@ def aggregates_table(tables: Tables) -> Table:
     return Table(columns, rows, "aggregates.csv", cards=True)
 
 
-def reach_table(tables: Tables) -> Table:
+def shares_table(tables: Tables) -> Table:
     """In how many cases each method reaches a share, and how it then compares."""
-    columns = [Column("method", text=True), *(Column(format_share(share)) for share in SHARES)]
-    counts = tables.matched.group_by("method", "share", maintain_order=True).agg(
-        reached=pl.col("assisted_mean").count(), of=pl.len()
+    versus = sentences.versus_at_shares(tables)
+    return _levels_table(tables.matched, "share", "assisted", versus, "matched.csv")
+
+
+def floors_table(tables: Tables) -> Table:
+    """In how many cases each method performs as well as a floor, and how it then compares."""
+    versus = sentences.versus_at_floors(tables)
+    return _levels_table(tables.floors, "floor", "unassisted", versus, "floors.csv")
+
+
+def _levels_table(
+    table: pl.DataFrame, level: str, known: str, versus: pl.DataFrame, file: str
+) -> Table:
+    """A row per method, a column per level: how often it is reached, ahead and behind."""
+    counts = table.group_by("method", level, maintain_order=True).agg(
+        reached=pl.col(f"{known}_mean").count(), of=pl.len()
     )
-    compared = {(r["method"], r["share"]): r for r in sentences.both_ways(tables).rows(named=True)}
+    compared = {(row["method"], row[level]): row for row in versus.rows(named=True)}
+    levels = table[level].unique(maintain_order=True).to_list()
+    columns = [Column("method", text=True), *(Column(format_share(each)) for each in levels)]
     rows = []
     for part in counts.partition_by("method", maintain_order=True):
         name = str(part["method"][0])
         cells = []
         for row in part.rows(named=True):
-            versus = compared.get((name, row["share"]), {"ahead": 0, "behind": 0})
-            signs = f" (+{versus['ahead']} \N{MINUS SIGN}{versus['behind']})"
-            known = any(versus[way] for way in ("ahead", "behind"))
-            cells.append(f"{row['reached']} of {row['of']}{signs if known else ''}")
+            signs = compared.get((name, row[level]), {"ahead": 0, "behind": 0})
+            shown = f" (+{signs['ahead']} \N{MINUS SIGN}{signs['behind']})"
+            clear = signs["ahead"] or signs["behind"]
+            cells.append(f"{row['reached']} of {row['of']}{shown if clear else ''}")
         rows.append([readable(name), *cells])
-    return Table(columns, rows, "matched.csv", cards=True)
+    return Table(columns, rows, file, cards=True)
 
 
 def methods_table(tables: Tables) -> Table:

@@ -1,6 +1,5 @@
 """Tables of a comparison: points, points at matched shares, scores of methods, aggregates."""
 
-import itertools
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -18,7 +17,12 @@ from qbumpers.analysis.statistics import (
     percentile_interval,
 )
 from qbumpers.comparison.aggregates import aggregate, improvement, iqm, median
-from qbumpers.comparison.matched import SHARES, at_share
+from qbumpers.comparison.levels import (
+    case_columns,
+    estimate_columns,
+    floor_rows,
+    share_rows,
+)
 from qbumpers.comparison.methods import BASELINE
 from qbumpers.comparison.results import MEASURES, CaseResults, Comparison
 
@@ -39,6 +43,10 @@ class Tables(NamedTuple):
         matched: a row per case, method and share: `assisted` and `unassisted` there, in reward
             units; null if the method does not reach the share. `assisted_lead` and
             `unassisted_lead` are minus those of the bumpers (all of a case and share hold at once).
+        floors: a row per comparable case, method and floor of performance, a share of the way from
+            no assistance to the best return: level (of the assisted return) and `unassisted` there,
+            in reward units; null if the method does not perform as well. `unassisted_lead` is minus
+            that of the bumpers (all of a case and floor hold at once).
         scores: a row per case and method: settings, normalised `hypervolume`, `advantage` over the
             bumpers (all of a case hold at once), rank, and `largest`, the share of resamples in
             which it covers most. Only comparable cases, and in these only methods that return no
@@ -53,6 +61,7 @@ class Tables(NamedTuple):
     left_out: pl.DataFrame
     points: pl.DataFrame
     matched: pl.DataFrame
+    floors: pl.DataFrame
     scores: pl.DataFrame
     aggregates: pl.DataFrame
 
@@ -83,7 +92,10 @@ def find_tables(comparison: Comparison, seed: int = 0) -> Tables:
             orient="row",
         ),
         points=_table([row for case in cases for row in _points(case)]),
-        matched=_table([row for case in cases for row in _matched(case, generator)]),
+        matched=_table([row for case in cases for row in share_rows(case, generator)]),
+        floors=_table(
+            [row for case in cases if case.comparable for row in floor_rows(case, generator)]
+        ),
         scores=_table(rows),
         aggregates=_table(_aggregates(names, scored, generator)),
     )
@@ -93,18 +105,10 @@ def _table(rows: list[dict[str, Any]]) -> pl.DataFrame:
     return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None) if rows else pl.DataFrame()
 
 
-def _columns(name: str, estimate: IntervalEstimate) -> dict[str, float]:
-    return {f"{name}_{part}": number for part, number in estimate._asdict().items()}
-
-
-def _key(case: CaseResults) -> dict[str, str]:
-    return {"task": case.task, "learner": case.learner}
-
-
 def _case_row(case: CaseResults) -> dict[str, Any]:
     assisted, unassisted = case.reference
     return {
-        **_key(case),
+        **case_columns(case),
         "trials": case.experiment.trials,
         "episodes": case.experiment.episodes,
         "best": case.best,
@@ -119,14 +123,16 @@ def _points(case: CaseResults) -> list[dict[str, Any]]:
     anchors = {name: samples[np.newaxis] for name, samples in case.anchors.items()}
     return [
         {
-            **_key(case),
+            **case_columns(case),
             "method": name,
             "number": number,
             "condition": ids[number],
             **{
                 column: value
                 for place, measure in enumerate(MEASURES)
-                for column, value in _columns(measure, mean_interval(trials[:, place])).items()
+                for column, value in estimate_columns(
+                    measure, mean_interval(trials[:, place])
+                ).items()
             },
         }
         for methods, conditions in (
@@ -137,30 +143,6 @@ def _points(case: CaseResults) -> list[dict[str, Any]]:
         for ids in [conditions[name]]
         for number, trials in enumerate(samples)
     ]
-
-
-def _matched(case: CaseResults, generator: np.random.Generator) -> list[dict[str, Any]]:
-    """Rows of one case, each method beside the bumpers."""
-    found, replicates = {}, {}
-    for name, samples in case.methods.items():
-        means, resampled = samples.mean(axis=1), resampled_means([*samples], generator)
-        found[name] = {share: at_share(means, share) for share in SHARES}
-        replicates[name] = {share: at_share(resampled, share) for share in SHARES}
-    confidence = bonferroni(max(1, len(found) - 1))
-    rows = []
-    for name, share in itertools.product(found, SHARES):
-        row: dict[str, Any] = {**_key(case), "method": name, "share": share}
-        for place, measure in enumerate(MEASURES[1:]):
-            here, drawn = found[name][share][place], replicates[name][share][:, place]
-            row |= _columns(measure, percentile_interval(float(here), drawn))
-            lead = UNKNOWN
-            if BASELINE in found and name != BASELINE:
-                here = here - found[BASELINE][share][place]
-                drawn = drawn - replicates[BASELINE][share][:, place]
-                lead = percentile_interval(float(here), drawn, confidence)
-            row |= _columns(f"{measure}_lead", lead)
-        rows.append(row)
-    return rows
 
 
 def covered(points: np.ndarray, reference: np.ndarray, best: float) -> np.ndarray:
@@ -200,11 +182,11 @@ def _scores(case: CaseResults, generator: np.random.Generator) -> _CaseScores:
     order = scipy.stats.rankdata([-own[name] for name in names])
     rows = [
         {
-            **_key(case),
+            **case_columns(case),
             "method": name,
             "settings": len(means[name]),
-            **_columns("hypervolume", _own(case, means[name], resampled[name])),
-            **_columns("advantage", _advantage(case, name, means, resampled)),
+            **estimate_columns("hypervolume", _own(case, means[name], resampled[name])),
+            **estimate_columns("advantage", _advantage(case, name, means, resampled)),
             "rank": float(order[place]),
             "largest": float("nan") if unknown else float(largest[place]),
         }
@@ -269,9 +251,9 @@ def _aggregates(
         row: dict[str, Any] = {
             "method": name,
             "cases": len(having),
-            **_columns("iqm", aggregate(iqm, (own,), generator)),
-            **_columns("median", aggregate(median, (own,), generator)),
-            **_columns("rank", _mean_rank(name, having)),
+            **estimate_columns("iqm", aggregate(iqm, (own,), generator)),
+            **estimate_columns("median", aggregate(median, (own,), generator)),
+            **estimate_columns("rank", _mean_rank(name, having)),
         }
         improved = lead = UNKNOWN
         if name != BASELINE and all(BASELINE in each.runs for each in having):
@@ -283,7 +265,9 @@ def _aggregates(
                 generator,
                 bonferroni(max(1, len(names) - 1)),
             )
-        rows.append({**row, **_columns("improvement", improved), **_columns("lead", lead)})
+        rows.append(
+            {**row, **estimate_columns("improvement", improved), **estimate_columns("lead", lead)}
+        )
     return rows
 
 

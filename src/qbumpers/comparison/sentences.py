@@ -3,7 +3,7 @@
 "Clearly" means that an interval that holds for all methods at once lies on one side of 0.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import polars as pl
@@ -157,31 +157,50 @@ def _ahead_in(part: pl.DataFrame, row: Row) -> str:
 def at_shares(tables: Tables) -> list[str]:
     """Which methods are ahead of the bumpers, or behind, at equal shares of overridden steps.
 
-    Ahead is clearly better in one return and clearly worse in none; behind is the reverse.
+    Args:
+        tables: from `find_tables`.
+
+    Returns:
+        A sentence for each share at which one is in most cases.
+    """
+    return [
+        f"At {format_share(share)} of overridden steps, {said} in most of the cases in which both "
+        "reach it."
+        for share, said in _usual(versus_at_shares(tables), "share", ("ahead", "behind"))
+    ]
+
+
+def at_floors(tables: Tables) -> list[str]:
+    """Which methods teach more than the bumpers, or less, at equal performance.
 
     Args:
         tables: from `find_tables`.
 
     Returns:
-        A sentence for each share at which something is clear.
+        A sentence for each floor at which one does in most cases.
     """
-    said = []
-    for part in both_ways(tables).partition_by("share", maintain_order=True):
+    words = ("teaching clearly more", "teaching clearly less")
+    return [
+        f"If assisted return must be {format_share(floor)} of the way from no assistance to the "
+        f"best, {said} in most of the cases in which both perform as well."
+        for floor, said in _usual(versus_at_floors(tables), "floor", words)
+    ]
+
+
+def _usual(counts: pl.DataFrame, level: str, words: tuple[str, str]) -> Iterator[tuple[float, str]]:
+    """What holds in most cases, by level, with how many they are."""
+    for part in counts.partition_by(level, maintain_order=True) if counts.height else []:
         parts = []
-        for word in ("ahead", "behind"):
-            rows = part.filter(2 * pl.col(word) > pl.col("cases")).sort(word, descending=True)
-            names = [f"{_name(r)} ({r[word]} of {r['cases']})" for r in rows.rows(named=True)]
+        for column, word in zip(("ahead", "behind"), words, strict=True):
+            rows = part.filter(2 * pl.col(column) > pl.col("cases")).sort(column, descending=True)
+            names = [f"{_name(r)} ({r[column]} of {r['cases']})" for r in rows.rows(named=True)]
             if names:
                 parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {word}")
         if parts:
-            said.append(
-                f"At {format_share(part['share'][0])} of overridden steps, {'; '.join(parts)} in "
-                "most of the cases in which both reach it."
-            )
-    return said
+            yield part[level][0], "; ".join(parts)
 
 
-def both_ways(tables: Tables) -> pl.DataFrame:
+def versus_at_shares(tables: Tables) -> pl.DataFrame:
     """How often a method is ahead of the bumpers, or behind, at an equal share.
 
     Args:
@@ -191,20 +210,36 @@ def both_ways(tables: Tables) -> pl.DataFrame:
         A row per share and method but the bumpers: share, method, cases (that both reach), ahead
         (clearly better in one return and clearly worse in none) and behind (the reverse).
     """
-    lows, highs = (
-        [pl.col(f"{measure}_lead_{end}") for measure in ("assisted", "unassisted")]
-        for end in ("low", "high")
-    )
-    up, down = pl.any_horizontal(low > 0 for low in lows), pl.any_horizontal(h < 0 for h in highs)
+    return _versus(tables.matched, "share", ("assisted_lead", "unassisted_lead"))
+
+
+def versus_at_floors(tables: Tables) -> pl.DataFrame:
+    """How often a method teaches clearly more than the bumpers, or less, at equal performance.
+
+    Args:
+        tables: from `find_tables`.
+
+    Returns:
+        A row per floor and method but the bumpers: floor, method, cases (in which both perform as
+        well), ahead and behind.
+    """
+    return _versus(tables.floors, "floor", ("unassisted_lead",))
+
+
+def _versus(table: pl.DataFrame, level: str, leads: Sequence[str]) -> pl.DataFrame:
+    if not table.height:
+        return table
+    up = pl.any_horizontal(pl.col(f"{lead}_low") > 0 for lead in leads)
+    down = pl.any_horizontal(pl.col(f"{lead}_high") < 0 for lead in leads)
     return (
-        tables.matched.filter(pl.col("method") != BASELINE)
-        .group_by("share", "method", maintain_order=True)
+        table.filter(pl.col("method") != BASELINE)
+        .group_by(level, "method", maintain_order=True)
         .agg(
-            cases=pl.col("assisted_lead_mean").count(),
+            cases=pl.col(f"{leads[0]}_mean").count(),
             ahead=(up & ~down).sum(),
             behind=(down & ~up).sum(),
         )
-        .sort("share", maintain_order=True)
+        .sort(level, maintain_order=True)
     )
 
 
