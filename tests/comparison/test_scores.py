@@ -98,11 +98,11 @@ def test_a_few_trials_have_no_interval_but_a_number():
 
 
 def test_what_is_learned_at_a_floor_of_performance_is_read_off_a_frontier():
-    methods = {BASELINE: [(0.1, 6, 4), (0.3, 9.02, 2)], "undo": [(0.1, 6, 8), (0.3, 9.02, 1)]}
+    methods = {BASELINE: [(0.1, 6, 4), (0.3, 9.5, 2)], "undo": [(0.1, 6, 8), (0.3, 9.5, 1)]}
     made = {name: {"dial": "", "formula": ""} for name in methods}
     found = find_tables(Comparison("1", "", made, [case_results("one", methods)])).floors
     rows = {(row["method"], row["floor"]): row for row in found.rows(named=True)}
-    middle, high = (7.5 - 6) / 3.02, (9 - 6) / 3.02  # of the way between the two settings
+    middle, high = (7.5 - 6) / 3.5, (9 - 6) / 3.5  # of the way between the two settings
     expected = {
         (BASELINE, 0.5): 4,
         (BASELINE, 0.75): 4 - 2 * middle,

@@ -16,6 +16,13 @@ from qbumpers.errors import counted
 
 Row = Mapping[str, Any]
 
+_BEING = {"ahead": ("is ahead", "are ahead"), "behind": ("is behind", "are behind")}
+_TEACHING = {
+    "ahead": ("teaches clearly more", "teach clearly more"),
+    "behind": ("teaches clearly less", "teach clearly less"),
+}
+"""Of one method and of several."""
+
 
 def overall(tables: Tables) -> list[str]:
     """What came out over all comparable cases, and which cases are not.
@@ -166,7 +173,7 @@ def at_shares(tables: Tables) -> list[str]:
     return [
         f"At {format_share(share)} of overridden steps, {said} in most of the cases in which both "
         "reach it."
-        for share, said in _usual(versus_at_shares(tables), "share", ("ahead", "behind"))
+        for share, said in _usual(versus_at_shares(tables), "share", _BEING)
     ]
 
 
@@ -179,23 +186,24 @@ def at_floors(tables: Tables) -> list[str]:
     Returns:
         A sentence for each floor at which one does in most cases.
     """
-    words = ("teaching clearly more", "teaching clearly less")
     return [
         f"If assisted return must be {format_share(floor)} of the way from no assistance to the "
         f"best, {said} in most of the cases in which both perform as well."
-        for floor, said in _usual(versus_at_floors(tables), "floor", words)
+        for floor, said in _usual(versus_at_floors(tables), "floor", _TEACHING)
     ]
 
 
-def _usual(counts: pl.DataFrame, level: str, words: tuple[str, str]) -> Iterator[tuple[float, str]]:
+def _usual(
+    counts: pl.DataFrame, level: str, words: Mapping[str, tuple[str, str]]
+) -> Iterator[tuple[float, str]]:
     """What holds in most cases, by level, with how many they are."""
     for part in counts.partition_by(level, maintain_order=True) if counts.height else []:
         parts = []
-        for column, word in zip(("ahead", "behind"), words, strict=True):
+        for column, verbs in words.items():
             rows = part.filter(2 * pl.col(column) > pl.col("cases")).sort(column, descending=True)
             names = [f"{_name(r)} ({r[column]} of {r['cases']})" for r in rows.rows(named=True)]
             if names:
-                parts.append(f"{_listed(names)} {'is' if len(names) == 1 else 'are'} {word}")
+                parts.append(f"{_listed(names)} {verbs[len(names) > 1]}")
         if parts:
             yield part[level][0], "; ".join(parts)
 
