@@ -148,13 +148,13 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         observation, info = self.env.reset(seed=seed, options=options or None)
         self._session.begin(self._number(observation))
         self._observation, self._total, self._overrides = observation, 0.0, 0
-        account, row = self._session.account, np.array(self._session.values_now)
+        account, row = self._session.account, np.asarray(self._session.values_now)
         state = self._session.state
         first = Step(
             account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, row,
             account.start_value, 0.0, state, 0,
         )  # fmt: skip
-        return observation, {**info, RECORD: self._shown_state(first)._asdict()}
+        return observation, {**info, RECORD: self._shown(first)}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
@@ -184,7 +184,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._observation = observation
         self._total += reward
         self._overrides += step.overridden
-        info = {**info, RECORD: self._shown(step)._asdict()}
+        info = {**info, RECORD: self._shown(step)}
         if terminated or truncated:
             info[SUMMARY] = self._summary(step)
         return observation, reward, terminated, truncated, info
@@ -224,23 +224,17 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             )
         self._undo[1](before)
 
-    def _shown(self, step: Step) -> Step:
+    def _shown(self, step: Step) -> dict[str, Any]:
         """A record of its own for the caller, numbered as the environment numbers."""
-        step = self._shown_state(step._replace(values=step.values.copy()))
-        first = self._first_action
-        if not first:
-            return step
-        return step._replace(
-            proposed=step.proposed + first,
-            executed=step.executed + first,
-            credited=step.credited + first if step.credited >= 0 else -1,
-        )
-
-    def _shown_state(self, step: Step) -> Step:
-        first = self._first_state
-        if not first:
-            return step
-        return step._replace(state=step.state + first, next_state=step.next_state + first)
+        shown = step._asdict()
+        shown["values"] = step.values.copy()
+        if self._first_action:
+            for field in ("proposed", "executed", "credited"):
+                shown[field] += self._first_action if shown[field] >= 0 else 0
+        if self._first_state:
+            shown["state"] += self._first_state
+            shown["next_state"] += self._first_state
+        return shown
 
     def _summary(self, last: Step) -> dict[str, Any]:
         account = self._session.account
