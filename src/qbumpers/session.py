@@ -90,7 +90,9 @@ class Session:
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
         self._others = [
-            further_values(self.values, name, assistant.name) for name in assistant.values
+            row
+            for name in assistant.values
+            for row in further_values(self.values, name, assistant.name, model.actions).values()
         ]
         self._no_others = read_only(np.zeros((0, model.actions)))
         self._memory = assistant.start(model)

@@ -101,10 +101,13 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._generator = np.random.Generator(np.random.SFC64())
         self._noise: list[list[float]] = []
         self._recorded: list[list[float]] | None = None
+        task = task_inside(env)
+        self._seen = None if task is None else task.seen
         self._undo = undo_of(env) if "undo" in self.assistant.needs else None
         model = self._model()
         name = str(env.spec.id if env.spec else env)
-        use = use_in(env, name, model.states, model.observation_size, given)
+        states = model.states if self._seen is None else int(max(self._seen)) + 1
+        use = use_in(env, name, states, model.observation_size, given)
         self.values: QValues = as_values(given, use._replace(discount=self.discount))
         values = _from_zero(self.values, self._first_state)
         self._session = Session(self.assistant, values, model, perception)
@@ -190,7 +193,9 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         return observation, reward, terminated, truncated, info
 
     def _number(self, observation: Any) -> Any:
-        """The number of a state, from 0; other observations as they are."""
+        """The number of what the assistant sees, from 0; other observations as they are."""
+        if self._seen is not None:
+            return int(self._seen[observation])
         return observation - self._first_state if self._first_state else observation
 
     def _next_noise(self) -> Noise:
