@@ -109,8 +109,14 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         states = model.states if self._seen is None else int(max(self._seen)) + 1
         use = use_in(env, name, states, model.observation_size, given)
         self.values: QValues = as_values(given, use._replace(discount=self.discount))
-        values = _from_zero(self.values, self._first_state)
-        self._session = Session(self.assistant, values, model, perception)
+        self._session = Session(self.assistant, self._values_of_states(), model, perception)
+
+    def _values_of_states(self) -> QValues:
+        """Values by what a session is given for a state, compared with the environment already."""
+        if self._seen is not None:
+            return _FromZero(self.values, 0)
+        counts_from_zero = not self._first_state or isinstance(self.values, TabularValues)
+        return self.values if counts_from_zero else _FromZero(self.values, self._first_state)
 
     def _model(self) -> Model:
         """What the rule may know of the environment: more if it is made from a task."""
@@ -262,11 +268,6 @@ class _FromZero:
 
     def __call__(self, state: Any, /) -> Any:
         return self._values(state + self._first)
-
-
-def _from_zero(values: QValues, first: int) -> QValues:
-    """Values of states that count from 0; a table's do already."""
-    return values if not first or isinstance(values, TabularValues) else _FromZero(values, first)
 
 
 def _check_names(assistant: Assistant | str, options: Mapping[str, Any]) -> None:

@@ -222,7 +222,7 @@ def make_condition(
     task = as_task(task, setup.get("discount"))
     helper = assistant_of(assistant, "assistant")
     helper.check_task(task.name, had_by(task))
-    *found, rows = checked_values(task, helper, setup.get("values"))
+    table, others, gamma, rows = checked_values(task, helper, setup.get("values"))
     perception = setup.get("perception", "transition")
     if isinstance(perception, Perception):
         perception = checked(Perception, perception._asdict(), "perception")
@@ -230,7 +230,9 @@ def make_condition(
         named_perception(perception)
     condition = Condition(
         task,
-        *found,
+        table,
+        others,
+        gamma,
         helper,
         checked_learner(task, setup.get("learner")),
         perception,

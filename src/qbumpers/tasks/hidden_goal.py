@@ -1,4 +1,4 @@
-"""A goal that only the learner knows, as in shared autonomy with unknown goals (Reddy et al. 2018)."""
+"""A goal that only the learner knows, as in Reddy, Dragan and Levine (2018)."""
 
 import numpy as np
 

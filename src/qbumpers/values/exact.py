@@ -38,8 +38,8 @@ def solve(
     Returns:
         The values, with the further ones in `others`. If states look alike to the assistant, these
         are of what it sees, the means over such states: best if the goal were to be known from the
-        next step on (Littman, Cassandra and Kaelbling 1995, QMDP). Undiscounted, unreachable states without a
-        proper policy have value 0.
+        next step on (Littman, Cassandra and Kaelbling 1995, QMDP). Undiscounted, unreachable states
+        without a proper policy have value 0.
 
     Raises:
         RequestError: if the task has no table of transitions, the discount is out of range, or

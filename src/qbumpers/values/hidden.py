@@ -125,7 +125,7 @@ def _learn(
             proposed = _propose(row(known, state, width), pilot)
             future = 0.0
             if not ended:
-                following = row(learned, seen[state] * actions + proposed, width)
+                following = row(learned, int(seen[state]) * actions + proposed, width)
                 future = discount * best_value(following)
             row(counted, place, width)[executed] += 1
             rate = row(counted, place, width)[executed] ** -_DECAY

@@ -1,9 +1,9 @@
-"""The hidden goal: three goals and three pits; the learner's goal is ringed, only for the learner."""
+"""The hidden goal: three goals and pits; that of the episode is ringed for the learner."""
 
 from collections.abc import Sequence
 
 from qbumpers.decisions import Step
-from qbumpers.tasks.display import Display, Shape, circle, move_keys
+from qbumpers.tasks.display import Display, Shape, circle, move_keys, text
 from qbumpers.tasks.displays.cliff_walking import ACTIONS
 from qbumpers.tasks.displays.grid import CELL, grid_display
 
@@ -28,6 +28,7 @@ def hidden_goal_display() -> Display:
         cell, goal = divmod(int(state), len(GOALS))
         centre = ((GOALS[goal] + 0.5) * CELL, 0.5 * CELL)
         ring = circle(centre, 0.42 * CELL, "#d9ecd6", "#2f7031", 6.0)
-        return [ring, *plain.scene(cell, step)]
+        letter = text(centre, "G", "#2f7031", 0.45 * CELL)
+        return [ring, letter, *plain.scene(cell, step)]
 
     return plain._replace(scene=scene)
