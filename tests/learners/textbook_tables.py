@@ -6,7 +6,6 @@ them learn in whole trials, beside the compiled ones.
 
 import itertools
 import math
-from collections import Counter
 
 from tests.reference_rules import one_of
 
@@ -151,18 +150,10 @@ class ModelBased(Learner):
 
 
 class Imitator(Learner):
-    def __init__(self, *given):
-        super().__init__(*given)
-        self.seen = Counter()
-
-    def wanted(self, state):
-        return [self.seen[state, action] for action in self.actions]
+    """What it thinks of an action is how often it saw it."""
 
     def learn(self, state, action, reward, next_state, ended):
-        self.seen[state, action] += 1
-
-    def remembered(self):
-        return [(self.seen, 0.0)]
+        self.q[state, action] += 1
 
 
 class TwoRate(Learner):
