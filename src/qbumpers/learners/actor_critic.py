@@ -32,7 +32,7 @@ from qbumpers.random_streams import draw
 
 
 class ActorCritic(NamedTuple):
-    """An actor that prefers what turned out better than its critic had expected.
+    """An actor-critic: prefers what turned out better than its critic had expected.
 
     Attributes:
         discount: gamma of the critic's values, in (0, 1].
