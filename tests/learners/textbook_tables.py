@@ -10,6 +10,20 @@ import math
 from tests.reference_rules import one_of
 
 
+class Table:
+    """Rows of values, to be gone through by (state, action)."""
+
+    def __init__(self, rows):
+        self.rows = rows
+
+    def items(self):
+        return [((s, a), value) for s, own in enumerate(self.rows) for a, value in enumerate(own)]
+
+    def __setitem__(self, place, value):
+        state, action = place
+        self.rows[state][action] = value
+
+
 class Learner:
     """What the learners below have in common: epsilon-greedy choices by `wanted`."""
 
