@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from qbumpers.decisions import Noise, Situation
-from tests.learners.textbook_tables import LEARNERS
+from qbumpers.learners import PowerLaw
+from tests.learners.textbook_tables import LEARNERS, Table
 from tests.reference_rules import one_of
 
 
@@ -105,20 +106,6 @@ def draw_index(probabilities, generator):
     return max(index for index, probability in enumerate(probabilities) if probability > 0)
 
 
-class Table:
-    """Rows of values, to be gone through by (state, action)."""
-
-    def __init__(self, rows):
-        self.rows = rows
-
-    def items(self):
-        return [((s, a), value) for s, own in enumerate(self.rows) for a, value in enumerate(own)]
-
-    def __setitem__(self, place, value):
-        state, action = place
-        self.rows[state][action] = value
-
-
 class ReferenceTrial:
     """One trial of a condition.
 
@@ -167,11 +154,9 @@ class ReferenceTrial:
 
     def remembered(self):
         """Everything that can be forgotten, as (dictionary by (state, action, ...), its origin)."""
-        return (
-            self.other.remembered()
-            if self.other
-            else [(Table(self.own_values), self.learner.initial_value)]
-        )
+        if self.other:
+            return self.other.remembered()
+        return [(Table(self.own_values), self.learner.initial_value)]
 
     def forget(self, forgetting, episode):
         """Before an episode: a share of what there is, or what a power law of its age asks for."""
@@ -179,7 +164,8 @@ class ReferenceTrial:
             return
         for table, origin in self.remembered():
             for place, value in list(table.items()):
-                share = self.lost(place, episode) if hasattr(forgetting, "decay") else forgetting
+                aged = isinstance(forgetting, PowerLaw)
+                share = self.lost(place, episode) if aged else forgetting
                 table[place] = value + share * (origin - value)
 
     def lost(self, place, episode):

@@ -1,6 +1,7 @@
 """The model-based learner's plan against exact solutions, and its model by hand."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def test_who_tried_everything_once_plans_the_exact_values():
 
 def test_planning_with_frequencies_gives_the_exact_values_of_these():
     """Each outcome as often as its probability says, in hundredths."""
-    task = in_a_random_world().task
+    task: Any = in_a_random_world().task
     counts = np.round(task.probability * 100).astype(int)
     exact = replace(task, probability=counts / counts.sum(axis=2, keepdims=True))
     memory, learn = learner_of(10, 3, discount=exact.discount, outcomes=3, backups=28)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from qbumpers import RequestError
-from qbumpers.learners import SoftmaxQLearner, dispatch, make_learner
+from qbumpers.learners import Schedule, SoftmaxQLearner, dispatch, make_learner
 from qbumpers.learners.interface import Rates, Shape, Transition
 from qbumpers.learners.softmax import by_weight
 from qbumpers.random_streams import trial_streams
@@ -71,7 +71,7 @@ def test_the_credited_action_learns_and_the_others_decay():
 
 
 def test_what_is_learned_is_what_is_perseverated_and_stays_in_the_next_episode():
-    learner = SoftmaxQLearner(perseveration=1e9, learning_rate=(0.0, 0.0, 0.0))  # type: ignore
+    learner = SoftmaxQLearner(perseveration=1e9, learning_rate=Schedule(0.0, 0.0))
     memory, chances = dispatch.start(learner, SHAPE, stream()), stream()
     rates = Rates(0.0, 0.0)
     dispatch.learn(learner, memory, Transition(0, 2, 0.0, 1, False, -1), rates, chances)

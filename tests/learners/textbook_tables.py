@@ -6,9 +6,22 @@ them learn in whole trials, beside the compiled ones.
 
 import itertools
 import math
-from collections import Counter
 
 from tests.reference_rules import one_of
+
+
+class Table:
+    """Rows of values, to be gone through by (state, action)."""
+
+    def __init__(self, rows):
+        self.rows = rows
+
+    def items(self):
+        return [((s, a), value) for s, own in enumerate(self.rows) for a, value in enumerate(own)]
+
+    def __setitem__(self, place, value):
+        state, action = place
+        self.rows[state][action] = value
 
 
 class Learner:
@@ -151,18 +164,10 @@ class ModelBased(Learner):
 
 
 class Imitator(Learner):
-    def __init__(self, *given):
-        super().__init__(*given)
-        self.seen = Counter()
-
-    def wanted(self, state):
-        return [self.seen[state, action] for action in self.actions]
+    """What it thinks of an action is how often it saw it."""
 
     def learn(self, state, action, reward, next_state, ended):
-        self.seen[state, action] += 1
-
-    def remembered(self):
-        return [(self.seen, 0.0)]
+        self.q[state, action] += 1
 
 
 class TwoRate(Learner):

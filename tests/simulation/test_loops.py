@@ -120,8 +120,14 @@ CONDITIONS = {
     ),
 }
 SEED, TRIALS = 11, range(2, 5)
-# What a perception does is one table; two of them stand for all where a step is taken back.
-LONGER = {f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]}
+# What a perception does is one table; two of them stand for all where a step is taken back. Of
+# forgetting it is tables of other widths that matter, those of the actor-critic and of the model.
+LONGER = {
+    *(f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]),
+    "random world, softmax, by a power law",
+    "random world, imitator, forgetting",
+    "random world, two rates, forgetting",
+}
 
 
 def plain_trial(condition, trial, seed=SEED):

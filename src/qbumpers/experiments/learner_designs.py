@@ -53,6 +53,10 @@ def _known_motor(given: Any) -> Any:
 def _known_forgetting(given: Any) -> Any:
     if isinstance(given, dict | _PowerLawDesign):
         return _PowerLawDesign.model_validate(given)
+    if not isinstance(given, float | int):
+        raise RequestError(
+            f"learners.forgetting = {given!r}; a share in [0, 1] or a table with decay is needed"
+        )
     return _Share.validate_python(given)
 
 

@@ -9,8 +9,8 @@ The actor chooses by a softmax of preferences h, the critic says what a state is
 
 where pi is what the actor would have done before the step. If what the learner credits is not what
 it chose, for instance because an override was noticed, a is the credited action all the same: the
-actor then learns from a step that its policy did not take. In a probe an action of the largest
-preference is taken.
+actor then learns from a step that its policy did not take. A step from which nothing is learned
+leaves I as it was. In a probe an action of the largest preference is taken.
 
 The source gives no constants; the defaults are this package's own, small because delta is in reward
 units: where returns are in the hundreds, a larger step of the actor ends all exploration at once.
@@ -32,7 +32,7 @@ from qbumpers.random_streams import draw
 
 
 class ActorCritic(NamedTuple):
-    """An actor that prefers what turned out better than its critic had expected.
+    """An actor-critic: prefers what turned out better than its critic had expected.
 
     Attributes:
         discount: gamma of the critic's values, in (0, 1].

@@ -11,9 +11,9 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
-from qbumpers.compilation import INLINE, uncompiled
+from qbumpers.compilation import INLINE, inlined, uncompiled
 from qbumpers.errors import RequestError
-from qbumpers.learners.forgetting import Practice, fade, fade_by_age
+from qbumpers.learners.forgetting import Practice, fade, fade_by_age, grow_older
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.learners.registry import LearnerType, learner_for_settings
 
@@ -99,6 +99,23 @@ def forget_by_age(memory: Any, fresh: Any, practice: Practice) -> None:
     """
     for field, origin in _tables(memory, fresh):
         fade_by_age(field, origin, practice)
+
+
+@inlined
+def forget_between(share: float | None, practice: Practice | None, memory: Any, fresh: Any) -> None:
+    """Move every table of a memory towards what it was at first, between two episodes.
+
+    Args:
+        share: as for `forget`; None if no share is forgotten.
+        practice: as for `forget_by_age`, then an episode older; None if age means nothing.
+        memory: of a learner.
+        fresh: a memory of the same learner as it was at first; anything if nothing is forgotten.
+    """
+    if share is not None:
+        forget(memory, fresh, share)
+    if practice is not None:
+        forget_by_age(memory, fresh, practice)
+        grow_older(practice)
 
 
 def _tables(memory: Any, fresh: Any) -> list[tuple[np.ndarray, np.ndarray]]:

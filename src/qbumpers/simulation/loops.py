@@ -25,16 +25,9 @@ from qbumpers.decisions import (
     step_of,
 )
 from qbumpers.learners.dispatch import begin as begin_learner
-from qbumpers.learners.dispatch import (
-    choose,
-    forget,
-    forget_by_age,
-    fresh_memory,
-    learn,
-    prefer,
-)
+from qbumpers.learners.dispatch import choose, forget_between, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
-from qbumpers.learners.forgetting import Practice, begin_practice, grow_older, practise
+from qbumpers.learners.forgetting import Practice, begin_practice, practise
 from qbumpers.learners.interface import Shape
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
@@ -272,20 +265,6 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
             own[source, word] = streams[trial, episode, source, word]
 
 
-@inlined
-def _forget(
-    forgetting: float | None, practice: Practice | None, memory: Any, fresh: Any, episode: int
-) -> None:
-    """Move a memory towards what it was at first, between two episodes."""
-    if episode == 0:
-        return
-    if forgetting is not None:
-        forget(memory, fresh, forgetting)
-    if practice is not None:
-        forget_by_age(memory, fresh, practice)
-        grow_older(practice)
-
-
 @compiled
 def run_trials(
     model: Model, assistance: Assistance, learner: LearnerStack, streams: np.ndarray,
@@ -337,7 +316,8 @@ def run_trials(
             if episode > 0 and streams.shape[1] > 1:
                 _copy_streams(own, streams, trial, episode)
             when = When(trial, episode, episode < training)
-            _forget(learner.forgetting, learner.practice, memory, fresh, episode)
+            if episode > 0:
+                forget_between(learner.forgetting, learner.practice, memory, fresh)
             rates = begin_learner(learner.settings, memory, episode, training)
             rule_memory, recorded = _assisted_episode(
                 dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,
