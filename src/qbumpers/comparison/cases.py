@@ -16,6 +16,7 @@ from qbumpers.tasks.registry import task_names
 
 TASKS = (
     "cliff-walking", "larger-cliff", "windy-gridworld", "frozen-lake", "random-mdp", "inventory",
+    "hidden-goal",
 )  # fmt: skip
 """Tasks that are compared if none are named."""
 

@@ -125,7 +125,13 @@ def _path(scales: Scales) -> Settings:
     return [{"path": scales.path, "reach": reach} for reach in range(SETTINGS)]
 
 
-def _several_starts(scales: Scales) -> str:
+def _all_seen(scales: Scales) -> str:
+    return "the assistant sees all, the goal too" if scales.task.seen is None else ""
+
+
+def _no_path(scales: Scales) -> str:
+    if scales.task.seen is not None:
+        return "what the assistant sees of a state does not tell where a step leads"
     starts = int((scales.task.start > 0).sum())
     return (
         "" if starts == 1 else f"an episode may start in {starts} states, so there is no one path"
@@ -153,6 +159,13 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             f"0, and {_OPTION} (V* - Q*) / (V* - min Q*)",
             _limits("alpha", "relative_gaps"),
         ),
+        "closest-acceptable-unknown-goal": Method(
+            "alpha",
+            f"0, and {_OPTION} (V* - Q*) / (V* - min Q*) of a proposal, in its own row",
+            _limits("alpha", "gaps_by_proposal"),
+            _all_seen,
+        ),
+        "better-for-all-goals": Method("none", "it has no options", lambda scales: [{}], _all_seen),
         "accept-or-reject": Method(
             "tolerance",
             f"0, and {_OPTION} Q*(s, no_op) - Q*(s, a)",
@@ -171,7 +184,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             "reach",
             "0 to 7 steps from the way of best actions and their best outcomes",
             _path,
-            _several_starts,
+            _no_path,
         ),
         "random-override": Method(
             "probability",
@@ -237,13 +250,16 @@ def unsuited(name: str, scales: Scales) -> str:
         A reason in words.
     """
     for row in registered(name).values:
-        if _ROWS[row] not in scales.task.events:
+        if row in _ROWS and _ROWS[row] not in scales.task.events:
             return f"the task announces no {_ROWS[row]}"
+    reason = METHODS[name].unsuited(scales)
+    if reason:
+        return reason
     made = make_assistant(name, **METHODS[name].settings(scales)[0])
     lacking = [need for need in sorted(made.needs) if not had_by(scales.task)[need]]
     if lacking:
         return f"the task has no {NEEDED_THINGS[lacking[0]]}"
-    return METHODS[name].unsuited(scales)
+    return ""
 
 
 def check_names(names: Sequence[str]) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 from qbumpers.tasks import TabularTask
 from qbumpers.values import solve
 from qbumpers.values.events import safety, success
+from qbumpers.values.exact import solved_rows
+from qbumpers.values.others import PER_PROPOSAL
 
 
 def reachable(task: TabularTask) -> np.ndarray:
@@ -56,8 +58,9 @@ class Scales:
 
     @cached_property
     def values(self) -> np.ndarray:
-        """Q*, float64 [S, A]."""
-        return solve(self.task).table
+        """Q* of what the assistant sees of each state, float64 [S, A]."""
+        found, seen = solve(self.task).table, self.task.seen
+        return found if seen is None else found[seen]
 
     @cached_property
     def states(self) -> np.ndarray:
@@ -87,6 +90,17 @@ class Scales:
         own = self.values[self.states]
         best, worst = own.max(axis=1, keepdims=True), own.min(axis=1, keepdims=True)
         return distinct((best - own) / np.where(best > worst, best - worst, 1.0))
+
+    @cached_property
+    def gaps_by_proposal(self) -> np.ndarray:
+        """`relative_gaps` of each proposal in its own row of the values, float64 [D]."""
+        rows = solved_rows(self.task, PER_PROPOSAL, self.task.discount).values()
+        found = []
+        for proposed, row in enumerate(rows):
+            table = row.table
+            best, worst = table.max(axis=1), table.min(axis=1)
+            found.append((best - table[:, proposed]) / np.where(best > worst, best - worst, 1.0))
+        return distinct(np.array(found))
 
     @cached_property
     def losses_to_no_op(self) -> np.ndarray:
