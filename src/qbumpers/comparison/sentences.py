@@ -158,7 +158,8 @@ def _ahead_in(part: pl.DataFrame, row: Row) -> str:
     own = part.filter(method=row["method"])
     if row["method"] == BASELINE or own["advantage_mean"].null_count():
         return ""
-    return f", clearly more than {NAMES[BASELINE]} in {len(_more(own, 'advantage'))} of them"
+    number = len(_more(own, "advantage")) or "none"
+    return f", clearly more than {NAMES[BASELINE]} in {number} of them"
 
 
 def at_shares(tables: Tables) -> list[str]:
