@@ -16,6 +16,7 @@ from qbumpers.comparison.scores import Tables
 
 _ACROSS = 3
 _PANEL = 3.3  # width of a panel, in inches
+_WIDEST = 11  # inches
 _LEGEND_COLUMNS = 5
 _FAR = 1000  # from which on the axis is logarithmic, and needs more space beyond the last point
 _SHOWN, _LIMITS = (-0.5, 1.05), (-0.6, 1.15)  # of normalised returns
@@ -255,7 +256,8 @@ def ranks_figure(tables: Tables) -> Figure:
     for row in tables.scores.iter_rows(named=True):
         place = (methods.index(row["method"]), cases.index((row["task"], row["learner"])))
         ranks[place] = row["rank"]
-    with figure(max(5.0, 2.6 + 0.52 * len(cases)), 2.6 + 0.27 * len(methods)) as drawing:
+    width = min(max(5.0, 2.6 + 0.52 * len(cases)), _WIDEST)
+    with figure(width, 2.6 + 0.27 * len(methods)) as drawing:
         axes = drawing.subplots()
         axes.grid(visible=False)
         axes.imshow(ranks, cmap="viridis_r", aspect="auto", vmin=1, vmax=len(methods))
