@@ -21,3 +21,8 @@ gymnasium.register(
     entry_point="qbumpers.tasks.lunar_lander.environment:LunarLander",
     max_episode_steps=1000,
 )
+gymnasium.register(
+    id="qbumpers/MountainCar-v0",
+    entry_point="qbumpers.tasks.mountain_car:MountainCar",
+    max_episode_steps=200,
+)

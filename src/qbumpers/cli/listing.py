@@ -49,17 +49,17 @@ def _list_assistants() -> Table:
 
 def _list_tasks(before: set[str]) -> Table:
     from qbumpers.tasks.registry import (
+        explanations,
         own_tasks,
         tabular_environments,
-        task_names,
         vector_environments,
     )
 
     own = own_tasks()
 
     listing = table("task", "what it is")
-    for name in task_names():
-        listing.add_row(name, "a task of your own" if name in own else "a task of this package")
+    for name, explanation in explanations().items():
+        listing.add_row(name, "a task of your own" if name in own else explanation)
     for name in tabular_environments():
         listing.add_row(name, "a Gymnasium environment with a transition table; give a discount")
     for name in vector_environments():

@@ -23,7 +23,7 @@ from qbumpers.values import (
     TabularValues,
     learn_values,
     load_values,
-    shipped_expert,
+    shipped_values,
     solve,
 )
 
@@ -34,7 +34,7 @@ _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assum
 _SOURCES: dict[str, Callable[[Task], TabularValues | NetworkValues]] = {
     "exact": solve,
     "q-learning": learn_values,
-    "expert": lambda task: shipped_expert(task.name),
+    "expert": shipped_values,
 }
 SOURCES = tuple(_SOURCES)
 """What `values` of an experiment may say in place of a path."""

@@ -9,7 +9,8 @@ from qbumpers.experts.choosing import Judgement, best, judge, train_several, wit
 from qbumpers.experts.training import GENERAL, Recipe
 from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
-from qbumpers.values.shipped import shipped_experts
+
+_PAPERS = "lunar-lander"
 
 
 class Selection(NamedTuple):
@@ -31,8 +32,8 @@ class Selection(NamedTuple):
 
 
 def usual_recipe(task: Task) -> Recipe:
-    """The paper's recipe for a task that an expert ships for, a general one for any other."""
-    recipe = Recipe() if task.name in shipped_experts() else GENERAL
+    """The paper's recipe for its task, a general one for any other."""
+    recipe = Recipe() if task.name == _PAPERS else GENERAL
     return recipe._replace(learner=recipe.learner._replace(discount=task.discount))
 
 

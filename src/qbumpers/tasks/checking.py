@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from qbumpers.errors import RequestError, counted
+from qbumpers.errors import RequestError, counted, whole_number
 from qbumpers.tasks.task import Task
 
 _EXACT, _NEAR = 1e-8, 1e-6  # how far from 1 sums of float64 and of float32 numbers come
@@ -73,6 +73,25 @@ def normalised_rows(name: str, probability: np.ndarray) -> np.ndarray:
     if (errors > _EXACT).any():
         return probability / sums[..., None]
     return probability
+
+
+def whole_in(value: Any, where: str, least: int, most: int) -> int:
+    """A whole number within bounds, both included.
+
+    Args:
+        value: an int or one of NumPy's integers.
+        where: for the message, for instance "task 'larger-cliff': rows".
+        least: the smallest that is allowed.
+        most: the largest.
+
+    Raises:
+        RequestError: if it is not whole, or out of bounds.
+    """
+    allowed = f"in [{least}, {most:,}]"
+    number = whole_number(value, where, allowed)
+    if not least <= number <= most:
+        raise RequestError(f"{where} = {value!r}; it must lie {allowed}")
+    return number
 
 
 def check_arrays(task: Any) -> None:

@@ -1,67 +1,115 @@
-"""Cliff Walking (Sutton and Barto 2018, p. 132) with a bonus at the goal (Section 4.1)."""
+"""Cliff Walking (Sutton and Barto 2018, p. 132) with a bonus at the goal (Section 4.1).
+
+`larger_cliff` has the same rules on grids of other sizes.
+"""
 
 from typing import Any
 
 import gymnasium
 import numpy as np
 
+from qbumpers.tasks.checking import whole_in
 from qbumpers.tasks.display import made_by
-from qbumpers.tasks.displays.cliff_walking import ACTIONS, MAP, cliff_walking_display
+from qbumpers.tasks.displays.cliff_walking import (
+    ACTIONS,
+    COLUMNS,
+    ROWS,
+    cliff_walking_display,
+    cliff_walking_map,
+)
 from qbumpers.tasks.environment import TabularEnvironment
+from qbumpers.tasks.grids import moved
 from qbumpers.tasks.tabular import TabularTask
 
-ROWS, COLUMNS = 4, 12
 START, GOAL = (3, 0), (3, 11)
 ACTION_NAMES = ACTIONS
 EPISODE_LIMIT = 100
 
-_MOVES = np.array([(-1, 0), (0, 1), (1, 0), (0, -1)])
+_BONUS = 100
+_MOST = 100  # rows or columns
 
 
 def state_of(row: int, column: int) -> int:
-    """The state number of a cell, counted from the upper left."""
+    """The state number of a cell of the paper's grid, counted from the upper left."""
     return row * COLUMNS + column
 
 
 def is_cliff(row: Any, column: Any) -> Any:
-    """Whether cells lie on the cliff; numbers or arrays."""
-    return (row == START[0]) & (column > START[1]) & (column < GOAL[1])
+    """Whether cells of the paper's grid lie on the cliff; numbers or arrays."""
+    return _is_cliff(row, column, ROWS, COLUMNS)
+
+
+def _is_cliff(row: Any, column: Any, rows: int, columns: int) -> Any:
+    return (row == rows - 1) & (column > 0) & (column < columns - 1)
 
 
 def cliff_walking() -> TabularTask:
-    """The task: 4 x 12 cells, actions up, right, down, left.
+    """Walk along a cliff, 4 x 12 cells; a fall costs 100 and leads back to the start.
 
-    Every action is worth -1; one onto the cliff -100 and back to the start, without an end; one
-    onto the goal 100 more, and the end. Moving off the grid leaves the position as it is.
+    Actions are up, right, down and left. Every action is worth -1; one onto the cliff -100 and back
+    to the start, without an end; one onto the goal 100 more, and the end. Moving off the grid
+    leaves the position as it is.
 
     Returns:
         The task; reaching the goal is its success, falling off the cliff its crash.
     """
-    row, column = np.divmod(np.arange(ROWS * COLUMNS), COLUMNS)
-    to_row = np.clip(row[:, None] + _MOVES[:, 0], 0, ROWS - 1)
-    to_column = np.clip(column[:, None] + _MOVES[:, 1], 0, COLUMNS - 1)
-    falls = is_cliff(to_row, to_column)
-    arrives = (to_row == GOAL[0]) & (to_column == GOAL[1])
-    start = np.zeros(ROWS * COLUMNS)
-    start[state_of(*START)] = 1
+    return TabularTask(
+        name="cliff-walking",
+        episode_limit=EPISODE_LIMIT,
+        make_display=made_by(cliff_walking_display),
+        environment_spec=gymnasium.spec("qbumpers/CliffWalking-v0"),
+        **_rules(ROWS, COLUMNS, _BONUS),
+    )
+
+
+def larger_cliff(rows: int = 8, columns: int = 24) -> TabularTask:
+    """Cliff Walking on a grid of any size; V*(s0) is 87 on each.
+
+    The bonus at the goal is 87 more than the shortest path is long, so that as much can be lost
+    as on the paper's grid, whatever the size; the episode limit grows with the number of cells.
+
+    Args:
+        rows: in [2, 100]; the cliff lies along the last one.
+        columns: in [3, 100].
+
+    Returns:
+        The task; of 4 rows and 12 columns, the paper's.
+
+    Raises:
+        RequestError: if the size is out of range.
+    """
+    rows = whole_in(rows, "task 'larger-cliff': rows", 2, _MOST)
+    columns = whole_in(columns, "task 'larger-cliff': columns", 3, _MOST)
+    return TabularTask(
+        name="larger-cliff",
+        episode_limit=-(-EPISODE_LIMIT * rows * columns // (ROWS * COLUMNS)),
+        make_display=made_by(cliff_walking_display, rows, columns),
+        **_rules(rows, columns, _BONUS + columns - COLUMNS),
+    )
+
+
+def _rules(rows: int, columns: int, bonus: int) -> dict[str, Any]:
+    """All of a task that the rules of the game decide."""
+    to_row, to_column = moved(rows, columns)
+    falls = _is_cliff(to_row, to_column, rows, columns)
+    arrives = (to_row == rows - 1) & (to_column == columns - 1)
+    first = (rows - 1) * columns
+    start = np.zeros(rows * columns)
+    start[first] = 1
     deterministic = {
-        "next_state": np.where(falls, state_of(*START), to_row * COLUMNS + to_column),
-        "reward": np.where(falls, -100.0, np.where(arrives, 99.0, -1.0)),
+        "next_state": np.where(falls, first, to_row * columns + to_column),
+        "reward": np.where(falls, -100.0, np.where(arrives, bonus - 1.0, -1.0)),
         "terminated": arrives,
         "success": arrives,
         "crash": falls,
         "probability": np.ones(falls.shape),
     }
-    return TabularTask(
-        name="cliff-walking",
-        start=start,
-        discount=1.0,
-        episode_limit=EPISODE_LIMIT,
-        grid=(ROWS, COLUMNS),
-        make_display=made_by(cliff_walking_display),
-        environment_spec=gymnasium.spec("qbumpers/CliffWalking-v0"),
+    return {
+        "start": start,
+        "discount": 1.0,
+        "grid": (rows, columns),
         **{field: array[:, :, None] for field, array in deterministic.items()},
-    )
+    }
 
 
 class CliffWalking(TabularEnvironment):
@@ -83,6 +131,6 @@ class CliffWalking(TabularEnvironment):
 
 def as_text(state: int) -> str:
     """The grid as text: S start, C cliff, G goal, o the walker."""
-    cells = np.array([list(row) for row in MAP])
+    cells = np.array([list(row) for row in cliff_walking_map()])
     cells.flat[state] = "o"
     return "\n".join(" ".join(row) for row in cells) + "\n"

@@ -10,18 +10,40 @@ import gymnasium
 from qbumpers.errors import RequestError, in_short, suggestion, unknown_name
 from qbumpers.imports import import_modules, module_and_name
 from qbumpers.registration import is_written_here
-from qbumpers.tasks.cliff_walking import cliff_walking
+from qbumpers.tasks.cliff_walking import cliff_walking, larger_cliff
 from qbumpers.tasks.identity import has_table
+from qbumpers.tasks.inventory import inventory
+from qbumpers.tasks.mountain_car import mountain_car
+from qbumpers.tasks.random_mdp import random_mdp
+from qbumpers.tasks.remapping import remapped
 from qbumpers.tasks.stepping import environment_name, make_environment, maker_name
 from qbumpers.tasks.tabular import TabularTask
 from qbumpers.tasks.task import Task, check_task
+from qbumpers.tasks.toy_text import frozen_lake, frozen_lake_8x8, taxi
 from qbumpers.tasks.vector import VectorTask
+from qbumpers.tasks.windy_gridworld import windy_gridworld
 
 
 def _lunar_lander(seed: int | None = None) -> VectorTask:
+    """Land between two flags (Section 4.3), on the same terrain in every episode."""
     from qbumpers.tasks.lunar_lander.stepper import lunar_lander  # Box2D loads when it is used
 
     return lunar_lander(seed)
+
+
+def _remapped(of: str | Mapping[str, Any], keys: Sequence[int]) -> Task:
+    """Any other task with its keys exchanged: of = "cliff-walking", keys = [1, 2, 3, 0].
+
+    See `qbumpers.tasks.remapping.remapped`.
+
+    Args:
+        of: its name, or a table of its name and its arguments, as `make_task` takes them.
+        keys: [A]; action a does what action keys[a] does in the other task.
+    """
+    given: dict[str, Any] = {"name": of} if isinstance(of, str) else dict(of)
+    if "name" not in given:
+        raise RequestError(f"task 'remapped': of = {of!r}; the name of a task is needed in it")
+    return remapped(make_task(given.pop("name"), **given), keys)
 
 
 _MODULE_MISSING = (
@@ -37,7 +59,16 @@ Named = str | gymnasium.Env[Any, Any] | Maker
 
 _tasks: dict[str, Callable[..., Task]] = {
     "cliff-walking": cliff_walking,
+    "larger-cliff": larger_cliff,
+    "windy-gridworld": windy_gridworld,
+    "frozen-lake": frozen_lake,
+    "frozen-lake-8x8": frozen_lake_8x8,
+    "taxi": taxi,
+    "inventory": inventory,
+    "random-mdp": random_mdp,
     "lunar-lander": _lunar_lander,
+    "mountain-car": mountain_car,
+    "remapped": _remapped,
 }
 
 
@@ -49,6 +80,11 @@ def register_task(name: str, make: Callable[..., Task]) -> None:
         make: makes the task; its parameters are the arguments that `make_task` takes for it.
     """
     _tasks[name] = make
+
+
+def explanations() -> dict[str, str]:
+    """What each registered task is, in a line: the first one of the docstring of what makes it."""
+    return {name: (make.__doc__ or "").strip().partition("\n")[0] for name, make in _tasks.items()}
 
 
 def own_tasks() -> dict[str, Callable[..., Task]]:

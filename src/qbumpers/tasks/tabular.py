@@ -31,7 +31,7 @@ from qbumpers.tasks.environment import TabularEnvironment
 from qbumpers.tasks.estimation import Estimate, estimated_table
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.stepping import Stepper, remade_by
-from qbumpers.tasks.task import distance_between
+from qbumpers.tasks.task import Remapping, distance_between
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +63,7 @@ class TabularTask:
         make_display: makes `display` of the task; no part of its digest.
         environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
             digest.
+        remapping: of which task it is one with other keys; no part of its digest.
 
     Raises:
         RequestError: if shapes disagree, a probability row does not sum to 1, a state or action
@@ -88,6 +89,7 @@ class TabularTask:
     estimate: Estimate | None = None
     make_display: Callable[["TabularTask"], Any] | None = None
     environment_spec: EnvSpec | None = None
+    remapping: Remapping | None = None
 
     observation_size = 0
     undoable = True

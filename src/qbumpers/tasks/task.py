@@ -1,6 +1,6 @@
 """What every task says about itself: hosts ask the task, never what kind of task it is."""
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import gymnasium
 import numpy as np
@@ -120,6 +120,11 @@ class Task(Protocol):
         ...
 
     @property
+    def remapping(self) -> "Remapping | None":
+        """Of which task it is another one with its actions in another order; None if of none."""
+        ...
+
+    @property
     def learners(self) -> tuple[str, ...]:
         """Names of the learners that suit it; the first is the default."""
         ...
@@ -176,6 +181,18 @@ class Task(Protocol):
     def make_environment(self, *, render_mode: str | None = None) -> gymnasium.Env[Any, Any]:
         """The task as a Gymnasium environment that truncates episodes at the step limit."""
         ...
+
+
+class Remapping(NamedTuple):
+    """What a task is whose actions are those of another one in another order.
+
+    Attributes:
+        of: the other task, which is not remapped itself.
+        keys: [A]; action a does what action keys[a] does in the other task.
+    """
+
+    of: Task
+    keys: tuple[int, ...]
 
 
 def distance_between(actions: int, stated: np.ndarray | None) -> np.ndarray:

@@ -31,7 +31,7 @@ from qbumpers.tasks.stepping import (
     remade_by,
     stepped_by_of,
 )
-from qbumpers.tasks.task import distance_between
+from qbumpers.tasks.task import Remapping, distance_between
 from qbumpers.tasks.undoing import can_undo
 from qbumpers.tasks.wrapping import altering_wrappers, step_limit
 
@@ -67,6 +67,7 @@ class VectorTask:
         make_display: makes `display` of the task; no part of its digest.
         environment_spec: how Gymnasium makes the environment that it is, if it does; no part of its
             digest.
+        remapping: of which task it is one with other keys; no part of its digest.
         stepped_by: what else decides its steps beside `make_stepper`, no part of its digest:
             classes and functions; and modules, for the versions of their libraries.
         revision: raised when it gives other numbers for a reason that its code does not show.
@@ -94,6 +95,7 @@ class VectorTask:
     origin: str = ""
     make_display: Callable[["VectorTask"], Any] | None = None
     environment_spec: EnvSpec | None = None
+    remapping: Remapping | None = None
     stepped_by: tuple[Any, ...] = ()
     revision: int = 1
 

@@ -3,7 +3,8 @@
 from qbumpers.values.exact import solve
 from qbumpers.values.network import NetworkValues
 from qbumpers.values.q_learning import learn_values
-from qbumpers.values.shipped import shipped_expert
+from qbumpers.values.remapping import remapped_values
+from qbumpers.values.shipped import shipped_expert, shipped_values
 from qbumpers.values.tabular import (
     QValues,
     TabularValues,
@@ -22,7 +23,9 @@ __all__ = [
     "decoded_values",
     "learn_values",
     "load_values",
+    "remapped_values",
     "shipped_expert",
+    "shipped_values",
     "solve",
     "start_interval",
 ]

@@ -4,7 +4,9 @@ from importlib import resources
 from typing import Any
 
 from qbumpers.errors import RequestError
+from qbumpers.tasks.task import Task
 from qbumpers.values.network import NetworkValues
+from qbumpers.values.remapping import remapped_values
 from qbumpers.values.tabular import decoded_values
 
 _FOLDER = resources.files("qbumpers.values").joinpath("built_in")
@@ -46,3 +48,20 @@ def shipped_expert(task: str) -> NetworkValues:
     if not isinstance(values, NetworkValues):
         raise RequestError(f"the expert that ships for task {task!r} is a table, not a network")
     return values
+
+
+def shipped_values(task: Task) -> NetworkValues:
+    """The values of the expert that ships for a task, or for the one whose keys it exchanges.
+
+    Args:
+        task: any.
+
+    Returns:
+        Its values; of a remapped task, those of the other one with their actions in its order.
+
+    Raises:
+        RequestError: if none ships.
+    """
+    if task.remapping is None:
+        return shipped_expert(task.name)
+    return remapped_values(shipped_expert(task.remapping.of.name), task)

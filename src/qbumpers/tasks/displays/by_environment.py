@@ -26,6 +26,7 @@ DISPLAYS: Mapping[str, Callable[[Any], MakeDisplay]] = {
     "CartPole-": lambda environment: made_by(cart_pole_display),
     "MountainCar-": lambda environment: made_by(mountain_car_display),
     "qbumpers/CliffWalking-": lambda environment: made_by(cliff_walking_display),
+    "qbumpers/MountainCar-": lambda environment: made_by(mountain_car_display),
     "qbumpers/LunarLander-": lambda environment: made_by(_lunar_lander, _seed_of(environment)),
 }
 """By the beginning of an environment's id: from the environment without its wrappers to what makes
