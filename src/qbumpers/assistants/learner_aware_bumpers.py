@@ -1,22 +1,24 @@
-"""Learner-aware bumpers: the help that misleads a learner least, within the bumpers' floor.
+"""Learner-aware bumpers: the help that misleads a learner least, and the lessons that pay.
 
 An override teaches a learner who does not notice it that its own action led where the executed one
-did. So with the floor of Stochastic Q Bumpers, x(e) = (V*(s_0) - G(s, e)) / (alpha (V*(s_0) - v_min)),
-the rule keeps `qbumpers.assistants.mirrors` of the learner, with weights w_k, and looks ahead at the
-credit that the proposal a would get if e were executed,
+did. So the rule keeps `qbumpers.assistants.mirrors` of the learner, with probabilities w_k, and
+looks ahead at what each would believe. A best action is executed. A proposal a that is not best is
 
-    C(e) = sum of w_k E[r + gamma (1 - terminal) max_b M_k(s', b) | s, e] over transition mirrors k.
+1. a lesson, executed whatever it costs in this episode, if that is less than it is worth,
 
-1. A best action is executed.
-2. Of the better actions within the floor, x(e) < 1, the candidate is that with the least
-   C(e) - 0.1 Q*(s, e): what the learner proposed gets the worst credit that is safe.
-3. The proposal is executed if it lies within the floor and its own credit is no larger.
-4. A mistake that the learner means, and that it has hardly experienced, is a lesson: it is executed
-   whatever the floor says. One fall that is meant settles what overriding would leave a tie.
-5. Else the candidate is executed, and a best action if there is none.
+       Q*(s, e) - Q*(s, a) < alpha sum of w_k / rate_k (H_k(e) - H_k(a)),
 
-N(s, a), what the learner has experienced of an action, grows by 1 if it is executed and fades when
-an override is credited in its place. alpha may exceed 1: help is then rarer than v_min asks for.
+   where H_k(e) is what the learner's own choices in s will cost once it has learned from e, and
+   1 / rate_k how many updates that lasts; a choice that leads back to s is made again, so its cost
+   counts up to 20 times more;
+2. else, if overrides would be taken for the learner's own doing, let pass with probability
+   1 - f(x(a)) if it is a slip and half of that if it is meant, f and x as of Stochastic Q Bumpers,
+   x(e) = (V*(s_0) - G(s, e)) / (alpha (V*(s_0) - v_min)): a trifle that happens misleads nobody;
+3. else replaced by e, of the better actions within the floor, x(e) < 1, that with the least
+   C(e) - 0.1 Q*(s, e), C the credit that a transition learner will give its own action: what it
+   proposed looks as bad as is safe. If there is none, e is a best action.
+
+alpha may exceed 1: then the floor lies below `v_min`.
 """
 
 from typing import Annotated, NamedTuple
@@ -25,35 +27,34 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.assistants.mirrors import (
+    MIRRORS,
     Mirrors,
-    Reading,
     between_episodes,
     blank_mirrors,
-    misled_value,
-    observant_share,
+    lasting_harm,
+    misled_credit,
     read,
     reflect,
-    transition_rate,
-    transition_share,
 )
 from qbumpers.assistants.registry import register_assistant
-from qbumpers.assistants.stochastic_q_bumpers import check_floor
+from qbumpers.assistants.stochastic_q_bumpers import check_floor, override_probability
 from qbumpers.choice import best_value, pick
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step, projected_return
 from qbumpers.tasks.dynamics import ENDS, TERMINATED, Dynamics
 
 _LEANING = 0.1  # weight of the value against the credit, so that of equal credits the best wins
-_MEANT = 0.7  # a lesson: the proposal is meant with at least this probability
-_NOVEL = 0.5  # a lesson: the learner has experienced the action less often than this
+_LENIENCE = 0.5  # towards trifles that are meant; those that are random, slips, all may pass
+_SURE = 0.999  # p_max of the logistic
+_REPEATS = 20.0  # how often a choice that leads back to its state is made again
 
 
 class LearnerAwareBumpersOptions(NamedTuple):
     """Options of learner-aware bumpers.
 
     Attributes:
-        alpha: how far the projected return may fall, from V*(s_0) towards `v_min`; smaller is more
-            support, above 1 it may fall below `v_min`.
+        alpha: how far the projected return may fall, from V*(s_0) towards `v_min`, and what lessons
+            are worth; smaller is more support, above 1 the return may fall below `v_min`.
         v_min: a lower bound on the return of an episode, below V*(s_0).
     """
 
@@ -66,7 +67,6 @@ class Awareness(NamedTuple):
 
     Attributes:
         mirrors: what it may have learned.
-        experience: float64 [S, A], how often it has experienced an action as its own doing.
         start_value: V*(s_0) of `episode`.
         episode: that of the last step.
         discount: gamma of the task.
@@ -74,7 +74,6 @@ class Awareness(NamedTuple):
     """
 
     mirrors: Mirrors
-    experience: np.ndarray
     start_value: float
     episode: int
     discount: float
@@ -84,10 +83,8 @@ class Awareness(NamedTuple):
 @compiled
 def unaware(options: LearnerAwareBumpersOptions, model: Model) -> Awareness:
     """The memory before the first episode: nothing is known of the learner."""
-    return Awareness(
-        blank_mirrors(model.states, model.actions), np.zeros((model.states, model.actions)),
-        0.0, -1, model.discount, model.dynamics,
-    )  # fmt: skip
+    mirrors = blank_mirrors(model.states, model.actions)
+    return Awareness(mirrors, 0.0, -1, model.discount, model.dynamics)
 
 
 @compiled
@@ -96,83 +93,99 @@ def aware(memory: Awareness, step: Step, options: LearnerAwareBumpersOptions) ->
     start_value = memory.start_value
     if step.episode != memory.episode:
         start_value = best_value(step.values)
-    shares = reflect(memory.mirrors, step, memory.discount, start_value - options.v_min)
-    experienced(memory.experience, step, shares)
+    reflect(memory.mirrors, step, memory.discount, start_value - options.v_min)
     if step.events & ENDS:
         between_episodes(memory.mirrors)
     return Awareness(
-        memory.mirrors, memory.experience, start_value, step.episode, memory.discount,
-        memory.dynamics,
+        memory.mirrors, start_value, step.episode, memory.discount, memory.dynamics
     )  # fmt: skip
 
 
-@compiled
-def experienced(experience: np.ndarray, step: Step, shares: np.ndarray) -> None:
-    """Count what a learner experiences of its actions, float64 [S, A], changed in place."""
-    if step.proposed == step.executed:
-        experience[step.state, step.proposed] += 1
-    else:
-        experience[step.state, step.proposed] *= 1 - transition_rate(shares)
-        experience[step.state, step.executed] += observant_share(shares)
+class Outlook(NamedTuple):
+    """Where the actions in a state lead.
 
-
-@compiled
-def credits(memory: Awareness, state: int, shares: np.ndarray) -> np.ndarray:
-    """C, float64 [A]: what a transition learner would believe of its proposal if e were executed.
-
-    In reward units, times the probability that it is a transition learner.
+    Attributes:
+        targets: float64 [A, K], what each is worth to each mirror.
+        back: float64 [A], probability that it leads back to the same state.
     """
-    dynamics, found = memory.dynamics, np.zeros(memory.experience.shape[1])
-    noticed = transition_share(shares)
-    for action in range(len(found)):
+
+    targets: np.ndarray
+    back: np.ndarray
+
+
+@compiled
+def foreseen(memory: Awareness, state: int) -> Outlook:
+    """Where actions lead by the transitions of the task."""
+    dynamics, best = memory.dynamics, memory.mirrors.best
+    targets, back = np.zeros((dynamics.actions, MIRRORS)), np.zeros(dynamics.actions)
+    for action in range(dynamics.actions):
         first, before = (state * dynamics.actions + action) * dynamics.outcomes, 0.0
         for index in range(first, first + dynamics.outcomes):
-            credit = noticed * dynamics.reward[index]
-            if not dynamics.events[index] & TERMINATED:
-                following = dynamics.next_state[index]
-                credit += memory.discount * misled_value(memory.mirrors, shares, following)
-            found[action] += (dynamics.cumulative[index] - before) * credit
+            chance, following = dynamics.cumulative[index] - before, dynamics.next_state[index]
             before = dynamics.cumulative[index]
-    return found
+            lasts = 0.0 if dynamics.events[index] & TERMINATED else 1.0
+            for k in range(MIRRORS):
+                future = lasts * memory.discount * best[following, k]
+                targets[action, k] += chance * (dynamics.reward[index] + future)
+            if following == state:
+                back[action] += lasts * chance
+    return Outlook(targets, back)
 
 
 @compiled
-def within_floor(situation: Situation, action: int, options: LearnerAwareBumpersOptions) -> bool:
-    """Whether the projected return after an action stays above the floor."""
-    reached = projected_return(situation.earned, situation.discount, situation.values[action])
-    room = options.alpha * (situation.start_value - options.v_min)
-    return situation.start_value - reached < room
+def lost_with(situation: Situation, action: int) -> float:
+    """Return that the episode has lost if an action is executed, in reward units."""
+    value = situation.values[action]
+    return situation.start_value - projected_return(situation.earned, situation.discount, value)
+
+
+@compiled
+def least_misleading(
+    situation: Situation, noise: Noise, room: float, shares: np.ndarray, targets: np.ndarray
+) -> int:
+    """The override: the better action within the floor that misleads least, else a best one."""
+    values, proposed = situation.values, situation.proposed
+    merits = np.full(len(values), -np.inf)
+    for action in range(len(values)):
+        if values[action] > values[proposed] and lost_with(situation, action) < room:
+            merits[action] = _LEANING * values[action] - misled_credit(shares, targets[action])
+    best = best_value(merits)
+    if best == -np.inf:
+        return pick(values, best_value(values), noise.tie)
+    return pick(merits, best, noise.tie)
 
 
 @compiled
 def weighed(
-    situation: Situation, noise: Noise, options: LearnerAwareBumpersOptions, reading: Reading,
-    credit: np.ndarray, experience: float,
+    situation: Situation, noise: Noise, options: LearnerAwareBumpersOptions, mirrors: Mirrors,
+    outlook: Outlook,
 ) -> Decision:  # fmt: skip
-    """The decision about a proposal that is not best: steps 2 to 5.
+    """The decision about a proposal that is not best.
 
     Args:
         situation: of the proposal.
-        noise: chooses among equal actions.
+        noise: decides whether a trifle passes, and among equal actions.
         options: of the rule.
-        reading: what the proposal says of the learner.
-        credit: float64 [A], see `credits`.
-        experience: N of the proposal.
+        mirrors: of the learner.
+        outlook: where the actions lead.
     """
-    values, proposed = situation.values, situation.proposed
-    merit = _LEANING * values - credit
-    allowed, best = np.full(len(values), -np.inf), -np.inf
-    for action in range(len(values)):
-        if values[action] > values[proposed] and within_floor(situation, action, options):
-            allowed[action] = merit[action]
-            best = max(best, merit[action])
-    if best > -np.inf and merit[proposed] >= best and within_floor(situation, proposed, options):
+    values, proposed, state = situation.values, situation.proposed, situation.state
+    loss = situation.start_value - options.v_min
+    room = options.alpha * loss
+    reading = read(mirrors, state, proposed, loss)
+    action = least_misleading(situation, noise, room, reading.shares, outlook.targets)
+    harms = (best_value(values) - values) * (1 + _REPEATS * outlook.back)
+    after_help = lasting_harm(
+        mirrors, reading.shares, state, proposed, action, outlook.targets[action], harms, loss
+    )
+    after_lesson = lasting_harm(
+        mirrors, reading.shares, state, proposed, proposed, outlook.targets[proposed], harms, loss
+    )
+    if values[action] - values[proposed] < options.alpha * (after_help - after_lesson):
         return Decision(proposed, 0.0)
-    if experience < _NOVEL and reading.meant > _MEANT:
-        return Decision(proposed, 0.0)
-    if best > -np.inf:
-        return Decision(pick(allowed, best, noise.tie), 1.0)
-    return Decision(pick(values, best_value(values), noise.tie), 1.0)
+    due = override_probability(lost_with(situation, proposed), room, _SURE, True)
+    probability = 1 - (reading.slip + _LENIENCE * reading.meant) * (1 - due)
+    return Decision(action if noise.coin < probability else proposed, probability)
 
 
 @register_assistant(
@@ -183,16 +196,12 @@ def weighed(
 def learner_aware_bumpers(
     situation: Situation, noise: Noise, options: LearnerAwareBumpersOptions, memory: Awareness
 ) -> Decision:
-    """Replace a proposal by what misleads the learner least; let it make a mistake that it means.
+    """Replace a proposal by what misleads the learner least; let it make mistakes that teach.
 
-    A learner that means to step off a cliff does so once, below the floor, and is not allowed to
-    again; `stochastic-q-bumpers` never lets it, or by chance, whether it would learn from it or not.
+    A learner that would go on stepping off a cliff does so once, below the floor;
+    `stochastic-q-bumpers` never lets it there, whatever it goes on believing.
     """
-    values, proposed, state = situation.values, situation.proposed, situation.state
-    if values[proposed] >= best_value(values):
-        return Decision(proposed, 0.0)
-    loss = situation.start_value - options.v_min
-    reading = read(memory.mirrors, state, proposed, loss)
-    credit = credits(memory, state, reading.shares)
-    experience = memory.experience[state, proposed]
-    return weighed(situation, noise, options, reading, credit, experience)
+    if situation.values[situation.proposed] >= best_value(situation.values):
+        return Decision(situation.proposed, 0.0)
+    outlook = foreseen(memory, situation.state)
+    return weighed(situation, noise, options, memory.mirrors, outlook)
