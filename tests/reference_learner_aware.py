@@ -38,9 +38,7 @@ class Mirror:
 
     def means(self, state, action, blur, loss):
         row = self.values[state]
-        near = [
-            close(max(row) - v, blur * loss) if blur else float(v == max(row)) for v in row
-        ]
+        near = [close(max(row) - v, blur * loss) if blur else float(v == max(row)) for v in row]
         return near[action] / sum(near)
 
 
@@ -177,7 +175,7 @@ class PlainLearnerAware:
             held = [sum(each.values()) for each in weights]
             for place, mirror in enumerate(old):
                 neighbours = [n for n in (place - 1, place + 1) if 0 <= n < len(old)]
-                arrive = {n: CHANGE / 2 for n in neighbours}
+                arrive = dict.fromkeys(neighbours, CHANGE / 2)
                 arrive[place] = 1 - CHANGE / 2 * len(neighbours)
                 total = sum(arrive[n] * held[n] for n in arrive)
                 for s, row in enumerate(mirror.values):
