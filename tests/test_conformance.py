@@ -20,6 +20,7 @@ from qbumpers.learners import (
     PERCEPTIONS,
     Motor,
     Perception,
+    PowerLaw,
     learners,
     make_learner,
     register_learner,
@@ -76,8 +77,9 @@ def test_a_perception_is_the_same_in_every_host(perception):
 
 def test_layers_around_a_learner_are_the_same_in_every_host():
     assistant = make_assistant("maximal")
-    layers = {"motor": Motor(slip=0.2, lag=0.3), "forgetting": 0.1}
-    assert check_conformance(assistant, tasks=TABLES, **layers)
+    for forgetting in (0.1, PowerLaw()):
+        layers = {"motor": Motor(slip=0.2, lag=0.3), "forgetting": forgetting}
+        assert check_conformance(assistant, tasks=TABLES, **layers)
 
 
 @pytest.mark.slow
