@@ -69,7 +69,8 @@ class PlainLearnerAware:
         )
 
     def back(self, situation, action):
-        return sum(p for p, _, to in self.outcomes(situation, action) if to == situation.state)
+        leading = [p for p, _, to in self.outcomes(situation, action) if to == situation.state]
+        return float(sum(leading))
 
     def chances(self, state, proposed):
         """Joint probability of every mirror, way to choose, and proposal that is meant or not."""

@@ -3,17 +3,18 @@ import math
 import numpy as np
 import pytest
 
-from qbumpers import RequestError, make_assistant, make_task, simulate, solve
+from qbumpers import RequestError, make_assistant, simulate, solve
 from qbumpers.assistants.mirrors import MIRRORS, PERCEPTIONS
 from qbumpers.assistants.model_free_learner_aware_bumpers import experienced, recalled
 from qbumpers.conformance import vector_corridor
 from qbumpers.decisions import Decision, Noise
 from qbumpers.simulation import make_condition, record
+from qbumpers.tasks import cliff_walking
 from qbumpers.tasks.dynamics import TERMINATED
 from tests.assistants.otherwise import bumpers
 from tests.assistants.situations import situation_of, step_of
 
-TASK = make_task("cliff-walking")
+TASK = cliff_walking()
 VALUES = np.asarray(solve(TASK).table)
 UP, RIGHT, DOWN, LEFT = range(4)
 START = 36

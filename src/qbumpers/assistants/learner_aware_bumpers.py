@@ -157,7 +157,7 @@ def least_misleading(
 
 @compiled
 def weighed(
-    situation: Situation, noise: Noise, options: LearnerAwareBumpersOptions, mirrors: Mirrors,
+    situation: Situation, noise: Noise, alpha: float, v_min: float, mirrors: Mirrors,
     outlook: Outlook,
 ) -> Decision:  # fmt: skip
     """The decision about a proposal that is not best.
@@ -165,13 +165,14 @@ def weighed(
     Args:
         situation: of the proposal.
         noise: decides whether a trifle passes, and among equal actions.
-        options: of the rule.
+        alpha: of the rule's options.
+        v_min: of the rule's options, in reward units.
         mirrors: of the learner.
         outlook: where the actions lead.
     """
     values, proposed, state = situation.values, situation.proposed, situation.state
-    loss = situation.start_value - options.v_min
-    room = options.alpha * loss
+    loss = situation.start_value - v_min
+    room = alpha * loss
     reading = read(mirrors, state, proposed, loss)
     action = least_misleading(situation, noise, room, reading.shares, outlook.targets)
     harms = (best_value(values) - values) * (1 + _REPEATS * outlook.back)
@@ -181,7 +182,7 @@ def weighed(
     after_lesson = lasting_harm(
         mirrors, reading.shares, state, proposed, proposed, outlook.targets[proposed], harms, loss
     )
-    if values[action] - values[proposed] < options.alpha * (after_help - after_lesson):
+    if values[action] - values[proposed] < alpha * (after_help - after_lesson):
         return Decision(proposed, 0.0)
     due = override_probability(lost_with(situation, proposed), room, _SURE, True)
     probability = 1 - (reading.slip + _LENIENCE * reading.meant) * (1 - due)
@@ -204,4 +205,4 @@ def learner_aware_bumpers(
     if situation.values[situation.proposed] >= best_value(situation.values):
         return Decision(situation.proposed, 0.0)
     outlook = foreseen(memory, situation.state)
-    return weighed(situation, noise, options, memory.mirrors, outlook)
+    return weighed(situation, noise, options.alpha, options.v_min, memory.mirrors, outlook)

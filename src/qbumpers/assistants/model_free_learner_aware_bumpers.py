@@ -142,4 +142,4 @@ def model_free_learner_aware_bumpers(
     if situation.values[situation.proposed] >= best_value(situation.values):
         return Decision(situation.proposed, 0.0)
     outlook = recalled(memory, situation.state, situation.values)
-    return weighed(situation, noise, options, memory.mirrors, outlook)
+    return weighed(situation, noise, options.alpha, options.v_min, memory.mirrors, outlook)
