@@ -156,6 +156,34 @@ def least_misleading(
 
 
 @compiled
+def is_lesson(
+    situation: Situation, action: int, alpha: float, loss: float, mirrors: Mirrors,
+    shares: np.ndarray, outlook: Outlook,
+) -> bool:  # fmt: skip
+    """Whether a mistake teaches more than it costs.
+
+    Args:
+        situation: of the proposal.
+        action: the override in its place.
+        alpha: of the rule's options.
+        loss: what an episode may lose, in reward units.
+        mirrors: of the learner.
+        shares: float64 [K], their probabilities.
+        outlook: where the actions lead.
+    """
+    values, proposed, state = situation.values, situation.proposed, situation.state
+    targets, cost = outlook.targets, values[action] - values[proposed]
+    harms = (best_value(values) - values) * (1 + _REPEATS * outlook.back)
+    helped = lasting_harm(mirrors, shares, state, proposed, action, targets[action], harms, loss)
+    if cost >= alpha * helped:  # no lesson does more than to take all harm away
+        return False
+    taught = lasting_harm(
+        mirrors, shares, state, proposed, proposed, targets[proposed], harms, loss
+    )
+    return cost < alpha * (helped - taught)
+
+
+@compiled
 def weighed(
     situation: Situation, noise: Noise, alpha: float, v_min: float, mirrors: Mirrors,
     outlook: Outlook,
@@ -170,19 +198,11 @@ def weighed(
         mirrors: of the learner.
         outlook: where the actions lead.
     """
-    values, proposed, state = situation.values, situation.proposed, situation.state
-    loss = situation.start_value - v_min
+    proposed, loss = situation.proposed, situation.start_value - v_min
     room = alpha * loss
-    reading = read(mirrors, state, proposed, loss)
+    reading = read(mirrors, situation.state, proposed, loss)
     action = least_misleading(situation, noise, room, reading.shares, outlook.targets)
-    harms = (best_value(values) - values) * (1 + _REPEATS * outlook.back)
-    after_help = lasting_harm(
-        mirrors, reading.shares, state, proposed, action, outlook.targets[action], harms, loss
-    )
-    after_lesson = lasting_harm(
-        mirrors, reading.shares, state, proposed, proposed, outlook.targets[proposed], harms, loss
-    )
-    if values[action] - values[proposed] < alpha * (after_help - after_lesson):
+    if is_lesson(situation, action, alpha, loss, mirrors, reading.shares, outlook):
         return Decision(proposed, 0.0)
     due = override_probability(lost_with(situation, proposed), room, _SURE, True)
     probability = 1 - (reading.slip + _LENIENCE * reading.meant) * (1 - due)

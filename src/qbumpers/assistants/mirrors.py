@@ -52,11 +52,13 @@ class Mirrors(NamedTuple):
     Attributes:
         values: float64 [S, A, K], their action values, in reward units.
         best: float64 [S, K], the largest of them in a state.
+        visited: bool [S], whether anything was learned in a state.
         weights: float64 [B, E, K], probabilities of temperature, epsilon and mirror; sum to 1.
     """
 
     values: np.ndarray
     best: np.ndarray
+    visited: np.ndarray
     weights: np.ndarray
 
 
@@ -89,7 +91,8 @@ def blank_mirrors(states: int, actions: int) -> Mirrors:
     weights = np.empty((len(_TEMPERATURES), len(_EPSILONS), MIRRORS))
     for k in range(MIRRORS):
         weights[:, :, k] = _PRIOR[k // _PER_PERCEPTION] / (_PER_PERCEPTION * _WAYS)
-    return Mirrors(np.zeros((states, actions, MIRRORS)), np.zeros((states, MIRRORS)), weights)
+    values, best = np.zeros((states, actions, MIRRORS)), np.zeros((states, MIRRORS))
+    return Mirrors(values, best, np.zeros(states, np.bool_), weights)
 
 
 @compiled
@@ -111,21 +114,24 @@ def _choices(mirrors: Mirrors, state: int, action: int, loss: float) -> np.ndarr
         action: what it chooses.
         loss: what an episode may lose, in reward units; temperatures are shares of it.
     """
-    values, best = mirrors.values, mirrors.best
-    found = np.empty((len(_TEMPERATURES), MIRRORS))
-    for k in range(MIRRORS):
-        equal = 0.0
-        for other in range(values.shape[1]):
-            equal += values[state, other, k] == best[state, k]
-        found[0, k] = (values[state, action, k] == best[state, k]) / equal
+    values, best, count = mirrors.values, mirrors.best, mirrors.best.shape[1]
+    found, own = np.zeros((len(_TEMPERATURES), MIRRORS)), np.zeros((len(_TEMPERATURES), MIRRORS))
+    # Mirrors are innermost, and counted at run time: so the compiler takes several at once.
+    for other in range(values.shape[1]):
+        for k in range(count):
+            found[0, k] += values[state, other, k] == best[state, k]
+    for k in range(count):
+        own[0, k] = values[state, action, k] == best[state, k]
     for tau in range(1, len(_TEMPERATURES)):
         per_gap = 1 / (8 * _TEMPERATURES[tau] * loss)
-        for k in range(MIRRORS):
-            total = 0.0
-            for other in range(values.shape[1]):
-                total += _closeness(best[state, k] - values[state, other, k], per_gap)
-            own = _closeness(best[state, k] - values[state, action, k], per_gap)
-            found[tau, k] = own / total
+        for other in range(values.shape[1]):
+            for k in range(count):
+                found[tau, k] += _closeness(best[state, k] - values[state, other, k], per_gap)
+        for k in range(count):
+            own[tau, k] = _closeness(best[state, k] - values[state, action, k], per_gap)
+    for tau in range(len(_TEMPERATURES)):
+        for k in range(count):
+            found[tau, k] = own[tau, k] / found[tau, k]
     return found
 
 
@@ -140,48 +146,60 @@ def read(mirrors: Mirrors, state: int, action: int, loss: float) -> Reading:
         loss: what an episode may lose, in reward units.
     """
     chances, weights = _choices(mirrors, state, action, loss), mirrors.weights
-    shares, meant = np.zeros(MIRRORS), 0.0
+    count = weights.shape[2]
+    deliberate, random = np.zeros(MIRRORS), np.zeros(MIRRORS)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
-            for k in range(MIRRORS):
-                shares[k] += weights[tau, way, k] * _chance(chances[tau, k], way, mirrors)
-            for k in range(_TRANSITION):
-                meant += weights[tau, way, k] * (1 - _EPSILONS[way]) * chances[tau, k]
+            for k in range(count):
+                weight = weights[tau, way, k]
+                deliberate[k] += weight * (1 - _EPSILONS[way]) * chances[tau, k]
+                random[k] += weight * _EPSILONS[way]
+    shares = np.empty(MIRRORS)
+    for k in range(count):
+        shares[k] = deliberate[k] + random[k] / mirrors.values.shape[1]
+    meant = _sum(deliberate, 0, _TRANSITION)
     total = _sum(shares, 0, MIRRORS)
     meant /= total
-    for k in range(MIRRORS):
+    for k in range(count):
         shares[k] /= total
     return Reading(shares, meant, _sum(shares, 0, _TRANSITION) - meant)
-
-
-@compiled
-def _chance(meant: float, way: int, mirrors: Mirrors) -> float:
-    """Probability of a proposal that is meant with probability `meant`, at an epsilon."""
-    return (1 - _EPSILONS[way]) * meant + _EPSILONS[way] / mirrors.values.shape[1]
 
 
 @compiled
 def _weigh(mirrors: Mirrors, step: Step, loss: float) -> None:
     """Change the weights by a proposal, and let them drift."""
     chances, weights = _choices(mirrors, step.state, step.proposed, loss), mirrors.weights
-    shares = np.zeros(MIRRORS)
+    count = weights.shape[2]
+    shares, even = np.zeros(MIRRORS), 1 / mirrors.values.shape[1]
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
-            for k in range(MIRRORS):
-                weights[tau, way, k] *= _chance(chances[tau, k], way, mirrors)
+            for k in range(count):
+                weights[tau, way, k] *= (1 - _EPSILONS[way]) * chances[tau, k] + _EPSILONS[
+                    way
+                ] * even
                 shares[k] += weights[tau, way, k]
     total = _sum(shares, 0, MIRRORS)
-    for k in range(MIRRORS):
-        shares[k] /= total
+    fresh = np.empty(MIRRORS)
+    for k in range(count):
+        first = k - k % _PER_PERCEPTION
+        held = _sum(shares, first, first + _PER_PERCEPTION) / total
+        fresh[k] = (_DRIFT_WITHIN * held / _PER_PERCEPTION + _DRIFT_BETWEEN / MIRRORS) / _WAYS
     kept = (1 - _DRIFT_WITHIN - _DRIFT_BETWEEN) / total
-    for perception in range(len(PERCEPTIONS)):
-        first = perception * _PER_PERCEPTION
-        held = _sum(shares, first, first + _PER_PERCEPTION)
-        fresh = _DRIFT_WITHIN * held / _PER_PERCEPTION + _DRIFT_BETWEEN / MIRRORS
-        for tau in range(len(_TEMPERATURES)):
-            for way in range(len(_EPSILONS)):
-                for k in range(first, first + _PER_PERCEPTION):
-                    weights[tau, way, k] = kept * weights[tau, way, k] + fresh / _WAYS
+    for tau in range(len(_TEMPERATURES)):
+        for way in range(len(_EPSILONS)):
+            for k in range(count):
+                weights[tau, way, k] = kept * weights[tau, way, k] + fresh[k]
+
+
+@compiled
+def _find_best(mirrors: Mirrors, state: int) -> None:
+    """Put the largest values of a state into `best`."""
+    values, best, count = mirrors.values, mirrors.best, mirrors.best.shape[1]
+    for k in range(count):
+        best[state, k] = values[state, 0, k]
+    for action in range(1, values.shape[1]):
+        for k in range(count):
+            best[state, k] = max(best[state, k], values[state, action, k])
 
 
 @compiled
@@ -189,14 +207,12 @@ def _rehearse(
     mirrors: Mirrors, state: int, action: int, target: np.ndarray, first: int, end: int
 ) -> None:
     """Let the mirrors from `first` to `end` learn `target` [K] of an action."""
-    values, best = mirrors.values, mirrors.best
+    values = mirrors.values
+    mirrors.visited[state] = True
     for k in range(first, end):
         rate = _RATES[k % _PER_PERCEPTION]
         values[state, action, k] += rate * (target[k] - values[state, action, k])
-        highest = values[state, 0, k]
-        for other in range(1, values.shape[1]):
-            highest = max(highest, values[state, other, k])
-        best[state, k] = highest
+    _find_best(mirrors, state)
 
 
 @compiled
@@ -211,7 +227,9 @@ def reflect(mirrors: Mirrors, step: Step, discount: float, loss: float) -> None:
     """
     _weigh(mirrors, step, loss)
     future = 0.0 if step.events & TERMINATED else discount
-    target = step.reward + future * mirrors.best[step.next_state]
+    target = np.empty(MIRRORS)
+    for k in range(MIRRORS):
+        target[k] = step.reward + future * mirrors.best[step.next_state, k]
     if step.proposed == step.executed:
         _rehearse(mirrors, step.state, step.proposed, target, 0, MIRRORS)
     else:
@@ -300,31 +318,37 @@ def _arrivals(shares: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _mix(row: np.ndarray, parts: np.ndarray) -> None:
-    """Mix the numbers [K] of neighbouring mirrors in place, by the parts [3, K] of `_arrivals`."""
-    below = row[0]
-    for k in range(MIRRORS):
-        own, above = row[k], row[min(k + 1, MIRRORS - 1)]
+def _mix(row: np.ndarray, parts: np.ndarray, padded: np.ndarray) -> None:
+    """Mix the numbers [K] of neighbouring mirrors in place.
+
+    Args:
+        row: the numbers.
+        parts: float64 [3, K], from `_arrivals`.
+        padded: float64 [K + 2], overwritten but for its ends.
+    """
+    for k in range(len(row)):
+        padded[k + 1] = row[k]
+    for k in range(len(row)):
+        below, own, above = padded[k], padded[k + 1], padded[k + 2]
         row[k] = parts[0, k] * below + parts[1, k] * own + parts[2, k] * above
-        below = own
 
 
 @compiled
 def between_episodes(mirrors: Mirrors) -> None:
     """Allow for a learning rate that changes from episode to episode: neighbouring mirrors mix."""
-    values, best, weights = mirrors
-    shares = np.zeros(MIRRORS)
+    values, weights = mirrors.values, mirrors.weights
+    shares, padded = np.zeros(MIRRORS), np.zeros(MIRRORS + 2)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             for k in range(MIRRORS):
                 shares[k] += weights[tau, way, k]
     parts = _arrivals(shares)
     for state in range(values.shape[0]):
-        for action in range(values.shape[1]):
-            _mix(values[state, action], parts)
-        for k in range(MIRRORS):
-            best[state, k] = values[state, :, k].max()
+        if mirrors.visited[state]:
+            for action in range(values.shape[1]):
+                _mix(values[state, action], parts, padded)
+            _find_best(mirrors, state)
     leaving = _arrivals(np.ones(MIRRORS))
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
-            _mix(weights[tau, way], leaving)
+            _mix(weights[tau, way], leaving, padded)
