@@ -1,9 +1,10 @@
-"""Draw and write the page on learner-aware bumpers: `python docs/make_learner_aware.py`.
+"""Draw and write the page on learner-aware bumpers: `python docs/make_learner_aware.py [FOLDER]`.
 
 Its numbers are those that `run_learner_aware.py` kept.
 """
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -84,4 +85,4 @@ def write(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    write(DOCS)
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS)

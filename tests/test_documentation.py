@@ -307,6 +307,12 @@ def test_the_reproduction_page_says_what_its_script_finds(tmp_path):
     assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
 
 
+def test_the_page_on_learner_aware_bumpers_says_what_was_measured(tmp_path):
+    assert make("make_learner_aware.py", tmp_path) == {"learner-aware.png"}
+    fresh = (tmp_path / "learner-aware.md").read_text(encoding="utf-8")
+    assert (DOCS / "learner-aware.md").read_text(encoding="utf-8") == fresh
+
+
 @pytest.mark.slow
 def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
     pictures = make("make_pictures.py", tmp_path)
