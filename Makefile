@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test test-slow lint bench docs dist clean
+.PHONY: help demo test test-docs test-slow lint bench docs dist clean
 
 help:  ## Show what there is to make
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -11,10 +11,13 @@ demo: $(VENV)/installed  ## Repeat the paper's Cliff Walking experiment, with fi
 	$(BIN)/qbumpers reproduce cliff-walking --out demo
 
 test: $(VENV)/installed-dev  ## Run the tests, some minutes
-	$(BIN)/pytest -m "not slow" -n 2
+	$(BIN)/pytest -m "not slow and not documentation" -n 2 --dist worksteal
+
+test-docs: $(VENV)/installed-dev  ## Run what the pages and examples show, and compare what they print
+	$(BIN)/pytest -m "documentation and not slow" -n 2 --dist worksteal
 
 test-slow: $(VENV)/installed-dev  ## Run the longer checks
-	$(BIN)/pytest -m slow -n 2
+	$(BIN)/pytest -m slow -n 2 --dist worksteal
 
 lint: $(VENV)/installed-dev $(VENV)/installed-docs  ## Check style, types and which way imports point
 	$(BIN)/ruff check .

@@ -12,7 +12,7 @@ import sweeps
 import whole_processes
 from measuring import is_quick, show
 
-from qbumpers.simulation.cores import usable_cores
+from qbumpers.cores import usable_cores
 
 BENCHMARKS = (simulation, shared_control, lander, deep, sweeps, cluster, whole_processes)
 

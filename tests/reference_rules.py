@@ -103,6 +103,18 @@ def shield(situation, noise, threshold):
     return one_of(masked, max(safe), noise.tie), 1.0
 
 
+def better_for_all_goals(situation, noise):
+    """The best on average of the actions that beat the proposal in every row."""
+    rows, values = [list(row) for row in situation.others], list(situation.values)
+    better = [
+        all(row[action] > row[situation.proposed] for row in rows) for action in range(len(values))
+    ]
+    if not any(better):
+        return situation.proposed, 0.0
+    masked = [value if allowed else None for value, allowed in zip(values, better, strict=True)]
+    return one_of(masked, max(v for v in masked if v is not None), noise.tie), 1.0
+
+
 def undo(situation, noise, tolerance=0.0):
     mistake = max(situation.values) - situation.values[situation.proposed] > tolerance
     return situation.proposed, float(mistake), mistake
@@ -132,6 +144,7 @@ RULES = {
     "random-override": random_override,
     "expert-mixing": expert_mixing,
     "shield": shield,
+    "better-for-all-goals": better_for_all_goals,
     "undo": undo,
     "correct": correct,
     "take-back": take_back,
@@ -247,6 +260,14 @@ class PlainClosestAcceptable:
 
     def observe(self, step):
         pass
+
+
+class PlainClosestAcceptableUnknownGoal(PlainClosestAcceptable):
+    """The same by the row of the proposal."""
+
+    def decide(self, situation, noise):
+        row = situation.others[situation.proposed]
+        return super().decide(situation._replace(values=row), noise)
 
 
 class PlainAcceptOrReject:
@@ -407,6 +428,7 @@ WITH_MEMORY: dict[str, Any] = {
     "fading": PlainFading,
     "hysteresis": PlainHysteresis,
     "closest-acceptable": PlainClosestAcceptable,
+    "closest-acceptable-unknown-goal": PlainClosestAcceptableUnknownGoal,
     "accept-or-reject": PlainAcceptOrReject,
     "trajectory-bumpers": PlainTrajectoryBumpers,
     "assist-as-needed": PlainAssistAsNeeded,

@@ -140,7 +140,9 @@ def changed(content):
     return content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :]
 
 
-@pytest.mark.parametrize("damage", [emptied, cut_short, changed])
+@pytest.mark.parametrize(
+    "damage", [cut_short, *(pytest.param(d, marks=pytest.mark.slow) for d in (emptied, changed))]
+)
 def test_damaged_code_is_made_again_with_one_warning(package, damage):
     shown(package)
     kept = sorted((package / "__pycache__").glob("*.nbc"))

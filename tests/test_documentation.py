@@ -152,7 +152,13 @@ def test_environments_of_other_packages_go_all_the_way_to_a_report(tmp_path):
     assert tables[0] == tables[1]
 
 
-@pytest.mark.parametrize("name", with_blocks())
+README = "README.md"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [n if n == README else pytest.param(n, marks=pytest.mark.documentation) for n in with_blocks()],
+)
 def test_what_a_page_shows_runs_and_prints_what_it_says(name, tmp_path):
     check_printed(name, tmp_path)
 

@@ -25,6 +25,7 @@ PRINTED = {
 }
 
 
+@pytest.mark.documentation
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs_and_prints(example, tmp_path):
     if example.name in NEEDED:

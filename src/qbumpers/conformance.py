@@ -29,6 +29,7 @@ from qbumpers.tasks import TabularTask, Task, cliff_walking
 from qbumpers.tasks.corridors import slippery_corridor, vector_corridor
 from qbumpers.tasks.dynamics import CRASH, LIMIT, SUCCESS, TERMINATED, TRUNCATED
 from qbumpers.values import NetworkValues, solve
+from qbumpers.values.others import PER_PROPOSAL, numbered
 
 _EPISODES, _RETENTION, _SEED = 4, 1, 2019
 _TOLERANCE = 1e-12  # of probabilities: two ways to the same exponential
@@ -133,11 +134,10 @@ def _values_by_state(condition: Condition) -> Any:
     """The condition's values as hosts in Python take them, with the further rows by name."""
     if not condition.task.states:
         return condition.values
-    names = condition.assistant.values
     values = _WithOthers(condition.values, condition.discount)
     values.others = {
         name: _WithOthers(condition.others[:, place], condition.discount)
-        for place, name in enumerate(names)
+        for place, name in enumerate(condition.row_names)
     }
     return values
 
@@ -275,13 +275,22 @@ def small_values(task: Task, assistant: Assistant) -> Any:
     generator = np.random.default_rng(_SEED)
     if task.states:
         solved = solve(task)
-        tables = {n: _random_table(generator, task) for n in assistant.values}
+        tables = {n: _random_table(generator, task) for n in _row_names(assistant, task)}
         others = {n: _WithOthers(table, solved.discount) for n, table in tables.items()}
         values = _WithOthers(np.asarray(solved.table), solved.discount)
         values.others = others
         return values
-    others = {name: _random_network(generator, task) for name in assistant.values}
+    others = {name: _random_network(generator, task) for name in _row_names(assistant, task)}
     return replace(_random_network(generator, task), others=others)
+
+
+def _row_names(assistant: Assistant, task: Task) -> list[str]:
+    """A row for each name, or one for each proposal of it."""
+    return [
+        row
+        for name in assistant.values
+        for row in (numbered(name, task.actions) if name == PER_PROPOSAL else [name])
+    ]
 
 
 def _random_table(generator: np.random.Generator, task: Task) -> np.ndarray:

@@ -69,6 +69,8 @@ def action_number(value: Any, where: str, first: int, actions: int) -> int:
     Raises:
         RequestError: if it is not whole, or not one of those actions.
     """
+    if type(value) is int and first <= value < first + actions:  # of every step: without a text
+        return value
     allowed = f"in [{first}, {first + actions})"
     number = whole_number(value, where, allowed)
     if not first <= number < first + actions:

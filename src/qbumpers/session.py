@@ -90,8 +90,11 @@ class Session:
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
         self._others = [
-            further_values(self.values, name, assistant.name) for name in assistant.values
+            row
+            for name in assistant.values
+            for row in further_values(self.values, name, assistant.name, model.actions).values()
         ]
+        self._no_others = read_only(np.zeros((0, model.actions)))
         self._memory = assistant.start(model)
         self._episode = -1
         self.account = Account(0.0, 1.0, 0.0, 0, 0)
@@ -170,12 +173,13 @@ class Session:
             raise RequestError(f"reward = {reward!r} of step {step}; it must be finite")
         situation: Situation = self._situation
         happened = events & ~(TERMINATED | TRUNCATED) if decision.undo else events
+        following = _as_state(next_state)
         experience = _perceive(
             self.perception, situation.proposed, decision.action, decision.undo, reward, notice
         )
         step = step_of(
             situation, self._noise, Execution(decision.action, decision.undo, decision.probability),
-            experience.action, reward, _as_state(next_state), happened,
+            experience.action, reward, following, happened,
         )  # fmt: skip
         self._memory = self.assistant.observe(self._memory, step)
         self.account = settle(self.account, reward, self.model.discount)
@@ -186,18 +190,18 @@ class Session:
             self.values_now = None  # stays so if the values do not fit
             where = f"after step {self.account.step}"
             self.values_now, self._others_now = self._rows(next_state, where)
-            self.state = _as_state(next_state)
+            self.state = following
         return step
 
     def _rows(self, state: Any, where: str) -> tuple[np.ndarray, np.ndarray]:
         """Q*(s, .) [A] and the further rows [K, A], which no rule can change."""
         actions = self.model.actions
         row = check_width(self.values(state), actions, where)
-        others = np.zeros((len(self._others), actions))
-        for place, further in enumerate(self._others):
-            others[place] = check_width(further(state), actions, where)
-        row.flags.writeable = others.flags.writeable = False
-        return row, others
+        row.flags.writeable = False
+        if not self._others:
+            return row, self._no_others
+        others = [check_width(each(state), actions, where) for each in self._others]
+        return row, read_only(np.array(others))
 
 
 def _use_of(model: Model, values: Any) -> Use:

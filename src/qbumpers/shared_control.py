@@ -101,13 +101,22 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._generator = np.random.Generator(np.random.SFC64())
         self._noise: list[list[float]] = []
         self._recorded: list[list[float]] | None = None
+        task = task_inside(env)
+        self._seen = None if task is None else task.seen
         self._undo = undo_of(env) if "undo" in self.assistant.needs else None
         model = self._model()
         name = str(env.spec.id if env.spec else env)
-        use = use_in(env, name, model.states, model.observation_size, given)
+        states = model.states if self._seen is None else int(max(self._seen)) + 1
+        use = use_in(env, name, states, model.observation_size, given)
         self.values: QValues = as_values(given, use._replace(discount=self.discount))
-        values = _from_zero(self.values, self._first_state)
-        self._session = Session(self.assistant, values, model, perception)
+        self._session = Session(self.assistant, self._values_of_states(), model, perception)
+
+    def _values_of_states(self) -> QValues:
+        """Values by what a session is given for a state, compared with the environment already."""
+        if self._seen is not None:
+            return _FromZero(self.values, 0)
+        counts_from_zero = not self._first_state or isinstance(self.values, TabularValues)
+        return self.values if counts_from_zero else _FromZero(self.values, self._first_state)
 
     def _model(self) -> Model:
         """What the rule may know of the environment: more if it is made from a task."""
@@ -148,13 +157,13 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         observation, info = self.env.reset(seed=seed, options=options or None)
         self._session.begin(self._number(observation))
         self._observation, self._total, self._overrides = observation, 0.0, 0
-        account, row = self._session.account, np.array(self._session.values_now)
+        account, row = self._session.account, np.asarray(self._session.values_now)
         state = self._session.state
         first = Step(
             account.episode, state, -1, -1, False, -1, False, 0.0, 0.0, 0.0, row,
             account.start_value, 0.0, state, 0,
         )  # fmt: skip
-        return observation, {**info, RECORD: self._shown_state(first)._asdict()}
+        return observation, {**info, RECORD: self._shown(first)}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Propose an action; the assistant decides which one the environment gets.
@@ -184,13 +193,15 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._observation = observation
         self._total += reward
         self._overrides += step.overridden
-        info = {**info, RECORD: self._shown(step)._asdict()}
+        info = {**info, RECORD: self._shown(step)}
         if terminated or truncated:
             info[SUMMARY] = self._summary(step)
         return observation, reward, terminated, truncated, info
 
     def _number(self, observation: Any) -> Any:
-        """The number of a state, from 0; other observations as they are."""
+        """The number of what the assistant sees, from 0; other observations as they are."""
+        if self._seen is not None:
+            return int(self._seen[observation])
         return observation - self._first_state if self._first_state else observation
 
     def _next_noise(self) -> Noise:
@@ -224,23 +235,17 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             )
         self._undo[1](before)
 
-    def _shown(self, step: Step) -> Step:
+    def _shown(self, step: Step) -> dict[str, Any]:
         """A record of its own for the caller, numbered as the environment numbers."""
-        step = self._shown_state(step._replace(values=step.values.copy()))
-        first = self._first_action
-        if not first:
-            return step
-        return step._replace(
-            proposed=step.proposed + first,
-            executed=step.executed + first,
-            credited=step.credited + first if step.credited >= 0 else -1,
-        )
-
-    def _shown_state(self, step: Step) -> Step:
-        first = self._first_state
-        if not first:
-            return step
-        return step._replace(state=step.state + first, next_state=step.next_state + first)
+        shown = step._asdict()
+        shown["values"] = step.values.copy()
+        if self._first_action:
+            for field in ("proposed", "executed", "credited"):
+                shown[field] += self._first_action if shown[field] >= 0 else 0
+        if self._first_state:
+            shown["state"] += self._first_state
+            shown["next_state"] += self._first_state
+        return shown
 
     def _summary(self, last: Step) -> dict[str, Any]:
         account = self._session.account
@@ -263,11 +268,6 @@ class _FromZero:
 
     def __call__(self, state: Any, /) -> Any:
         return self._values(state + self._first)
-
-
-def _from_zero(values: QValues, first: int) -> QValues:
-    """Values of states that count from 0; a table's do already."""
-    return values if not first or isinstance(values, TabularValues) else _FromZero(values, first)
 
 
 def _check_names(assistant: Assistant | str, options: Mapping[str, Any]) -> None:

@@ -13,6 +13,8 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "random-override": {"probability": 0.4, "second": True},
     "trajectory-bumpers": {"path": (0, 1), "reach": 0},
     "closest-acceptable": {"alpha": 0.3},
+    "closest-acceptable-unknown-goal": {"alpha": 0.3},
+    "better-for-all-goals": {},
     "accept-or-reject": {"tolerance": 0.25},
     "shield": {"threshold": 0.5},
     "advice-on-a-budget": {"when": "mistakes", "budget": 9, "threshold": 0.5},

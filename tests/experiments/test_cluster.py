@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from qbumpers.assistants import register_assistant
+from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells, cluster
 from qbumpers.experiments.cluster import LOCAL, RayCluster, versions
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import make_experiment
-from qbumpers.simulation.cores import usable_cores
 from tests.assistants import own_rules
 from tests.experiments.examples import cart, contents_of, settings
 from tests.experiments.with_ray import MARKS

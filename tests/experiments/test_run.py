@@ -10,12 +10,12 @@ import pytest
 
 import qbumpers
 from qbumpers.assistants import make_assistant
+from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
 from qbumpers.experiments import cells
 from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.simulation import simulate
-from qbumpers.simulation.cores import usable_cores
 from qbumpers.tasks import cliff_walking
 from qbumpers.values import load_values, solve
 from tests.experiments.examples import (

@@ -62,7 +62,12 @@ def test_samples_are_what_the_greedy_policy_achieves(quick):
 
 
 @pytest.mark.parametrize(
-    "network", [Network((8, 6), "relu"), Network((8, 6, 5)), Network(())], ids=str
+    "network",
+    [
+        Network((8, 6), "relu"),
+        *(pytest.param(each, marks=pytest.mark.slow) for each in (Network((8, 6, 5)), Network(()))),
+    ],
+    ids=str,
 )
 def test_a_correction_is_the_same_for_every_action(monkeypatch, network):
     monkeypatch.setattr(correcting, "_UPDATES", 200)

@@ -291,12 +291,14 @@ def test_arguments_of_an_environment_tell_values_apart():
 def test_a_task_of_which_less_is_seen_needs_values_of_what_is_seen():
     task = dataclasses.replace(random_task(1, 6, 2), seen=np.array([0, 0, 1, 1, 2, 2]))
     with pytest.raises(RequestError, match=r"a table \[6, 2\]; task task needs a table \[3, 2\]"):
-        simulate(task, "none", episodes=1, trials=1)
+        simulate(task, "none", values=np.ones((6, 2)), episodes=1, trials=1)
+    simulate(task, "none", episodes=1, trials=1)
     seen = TabularValues(np.ones((3, 2)), 0.9, "task", "by hand")
     simulate(task, "none", values=seen, episodes=1, trials=1)
     alike = dataclasses.replace(task, seen=np.array([5, 4, 3, 2, 1, 0]))
+    every_state = solve(dataclasses.replace(task, seen=None))
     with pytest.raises(RequestError, match="made for a task that differs from task task"):
-        simulate(alike, "none", episodes=1, trials=1)
+        simulate(alike, "none", values=every_state, episodes=1, trials=1)
 
 
 @pytest.mark.parametrize("as_function", [False, True])

@@ -19,6 +19,28 @@ from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation
 
 
+@compiled
+def nearest_acceptable(
+    values: np.ndarray, proposed: int, alpha: float, distance: np.ndarray, tie: float
+) -> Decision:
+    """The proposal if it is acceptable, else the nearest acceptable action, of equals the best.
+
+    Args:
+        values: float64 [A], by which actions are acceptable.
+        proposed: in [0, A).
+        alpha: share of the range of values within which an action is acceptable.
+        distance: float64 [A, A], between actions.
+        tie: in [0, 1), which of equally good ones.
+    """
+    lowest = worst_value(values)
+    acceptable = values - lowest >= (1 - alpha) * (best_value(values) - lowest)
+    if acceptable[proposed]:
+        return Decision(proposed, 0.0)
+    nearness = only(-distance[proposed], acceptable)
+    nearest = only(values, nearness == best_value(nearness))
+    return Decision(pick(nearest, best_value(nearest), tie), 1.0)
+
+
 class ClosestAcceptableOptions(NamedTuple):
     """Options of the closest acceptable action.
 
@@ -49,11 +71,6 @@ def closest_acceptable(
     If a neighbouring action will do, it is executed, although a better one is farther away;
     an override of `stochastic-q-bumpers` executes the best one.
     """
-    values, proposed = situation.values, situation.proposed
-    lowest = worst_value(values)
-    acceptable = values - lowest >= (1 - options.alpha) * (best_value(values) - lowest)
-    if acceptable[proposed]:
-        return Decision(proposed, 0.0)
-    nearness = only(-memory[proposed], acceptable)
-    nearest = only(values, nearness == best_value(nearness))
-    return Decision(pick(nearest, best_value(nearest), noise.tie), 1.0)
+    return nearest_acceptable(
+        situation.values, situation.proposed, options.alpha, memory, noise.tie
+    )

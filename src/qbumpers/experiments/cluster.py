@@ -12,6 +12,7 @@ from typing import Any
 
 import qbumpers
 from qbumpers.compilation import source_stamp
+from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
 from qbumpers.experiments import work
 from qbumpers.experiments.addresses import (
@@ -26,7 +27,6 @@ from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
 from qbumpers.simulation import Condition
-from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.packing import packed
 
 BATCH_SECONDS = 2.0

@@ -5,11 +5,11 @@ from collections.abc import Generator, Iterable
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 
+from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finish
-from qbumpers.simulation.cores import usable_cores
 from qbumpers.simulation.workers import make_pool, some_finished
 
 

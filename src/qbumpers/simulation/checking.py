@@ -18,22 +18,22 @@ from qbumpers.learners import (
 from qbumpers.learners import perception as named_perception
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
-from qbumpers.values.events import EVENT_ROWS, event_values
+from qbumpers.values.exact import SOLVED_ROWS, solved_rows
 from qbumpers.values.fitting import use_at
-from qbumpers.values.others import further_values
+from qbumpers.values.others import further_values, numbered
 from qbumpers.values.tabular import as_values
 
 
 def checked_values(
     task: Task, assistant: Assistant, values: QValues | np.ndarray | None
-) -> tuple[Any, Any, float]:
-    """Q* as a condition keeps it, the further rows, and the discount.
+) -> tuple[Any, Any, float, tuple[str, ...]]:
+    """Q* as a condition keeps it, the further rows, the discount, and the names of the rows.
 
     Args:
         task: what is to be learned.
         assistant: whose values they are.
         values: as `as_values` takes them; None for the exact solution of a task with a table. Rows
-            of `EVENT_ROWS` that values of such a task lack are solved, too.
+            of `SOLVED_ROWS` that values of such a task lack are solved, too.
 
     Raises:
         RequestError: if they do not fit the task, or an episode could start in a state that does
@@ -44,19 +44,28 @@ def checked_values(
     source: Any = solve(task) if values is None else values
     source = as_values(source, use_at(task))
     table = _table(task, source, "")
-    others = np.zeros((task.states, len(assistant.values), task.actions))
-    for place, name in enumerate(assistant.values):
-        others[:, place] = _table(task, _further(task, source, name, assistant), f" {name!r}")
+    discount = float(getattr(source, "discount", task.discount))
+    further = _all_further(task, assistant, source, discount)
+    others = np.zeros((task.states, len(further), task.actions))
+    for place, (name, row) in enumerate(further.items()):
+        others[:, place] = _table(task, row, f" {name!r}")
     for state in np.flatnonzero(task.start):
         assistant.check_start(float(table[state].max()))
-    return table, others, float(getattr(source, "discount", task.discount))
+    return table, others, discount, tuple(further)
 
 
-def _further(task: Task, source: Any, name: str, assistant: Assistant) -> Any:
-    """Further values by name; those of events are solved if the given values hold none."""
-    if name in EVENT_ROWS and name not in getattr(source, "others", {}):
-        return event_values(cast(TabularTask, task), name)
-    return further_values(source, name, assistant.name)
+def _all_further(
+    task: Task, assistant: Assistant, source: Any, discount: float
+) -> dict[str, QValues]:
+    """Further values by the names of their rows; solved if the given values hold none."""
+    found: dict[str, QValues] = {}
+    given = getattr(source, "others", {})
+    for name in assistant.values:
+        if name in SOLVED_ROWS and not {name, *numbered(name, 1)} & {*given}:
+            found |= solved_rows(cast(TabularTask, task), name, discount)
+        else:
+            found |= further_values(source, name, assistant.name, task.actions)
+    return found
 
 
 def _table(task: Task, source: Any, name: str) -> np.ndarray:
@@ -72,7 +81,7 @@ def _table(task: Task, source: Any, name: str) -> np.ndarray:
 
 def _checked_network(
     task: Task, assistant: Assistant, values: QValues | np.ndarray | None
-) -> tuple[Any, Any, float]:
+) -> tuple[Any, Any, float, tuple[str, ...]]:
     if values is not None:
         values = as_values(values, use_at(task))
     if not isinstance(values, NetworkValues):
@@ -81,8 +90,10 @@ def _checked_network(
             "network's values, for instance of load_values or train_expert"
         )
     # They have the shape of Q*, or there would be no such values.
-    others = tuple(further_values(values, name, assistant.name) for name in assistant.values)
-    return values, others, values.discount
+    further: dict[str, Any] = {}
+    for name in assistant.values:
+        further |= further_values(values, name, assistant.name, task.actions)
+    return values, tuple(further.values()), values.discount, tuple(further)
 
 
 def checked_learner(task: Task, settings: Any) -> Any:

@@ -91,6 +91,7 @@ class Condition(NamedTuple):
         retention: R, further episodes in which the learner goes on without the assistant.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
         files: what is in the files that the learner's settings name, float64 [N, K] by name.
+        row_names: names of the further rows.
     """
 
     task: Task
@@ -107,6 +108,7 @@ class Condition(NamedTuple):
     retention: int = 0
     common_random_numbers: bool = False
     files: Mapping[str, np.ndarray] = {}
+    row_names: tuple[str, ...] = ()
 
     def __reduce__(self) -> Any:
         """Pickle with the user's own rules and learner, which are registered on unpickling."""
@@ -222,11 +224,13 @@ def make_condition(
     task = as_task(task, setup.get("discount"))
     helper = assistant_of(assistant, "assistant")
     helper.check_task(task.name, had_by(task))
-    found = checked_values(task, helper, setup.get("values"))
+    table, others, gamma, rows = checked_values(task, helper, setup.get("values"))
     learner = checked_learner(task, setup.get("learner"))
     condition = Condition(
         task,
-        *found,
+        table,
+        others,
+        gamma,
         helper,
         learner,
         checked_perception(learner_for_settings(type(learner)), setup.get("perception")),
@@ -240,7 +244,8 @@ def make_condition(
     _check_numbers(condition)
     check_kept(f"options of assistant {helper.name}", helper.described())
     check_kept(f"learner {condition.learner_type.name}", plain(condition.learner))
-    return condition._replace(files=files_in(condition.learner, as_numbers(condition.learner)))
+    files = files_in(condition.learner, as_numbers(condition.learner))
+    return condition._replace(files=files, row_names=rows)
 
 
 def _check_numbers(condition: Condition) -> None:

@@ -2,35 +2,20 @@
 
 import contextlib
 import functools
-import multiprocessing
-import os
 import pickle
-import signal
-import sys
-import threading
-import types
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
-from multiprocessing import resource_tracker
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple, TypeVar
 
 from qbumpers.kept_code import KeptCodeWarning
+from qbumpers.processes import process_pool, submit_unheard
 from qbumpers.simulation.condition import Condition
 from qbumpers.simulation.packing import packed
 
 Found = TypeVar("Found")
 
-# Forked from a process that has loaded the libraries and nothing else, processes share their
-# memory and begin at once; Windows cannot fork.
-_START = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+_SHARED = "qbumpers.simulation.shared_by_processes"
 
 _LISTENING = 0.2  # seconds; a signal that another thread receives does not end a wait
 
@@ -59,11 +44,10 @@ class Pool(NamedTuple):
         Returns:
             What the function will return.
         """
-        with _interrupts_later():
-            if self.conditions is not None:
-                return self.executor.submit(function, self.conditions[condition], *arguments)
-            with _without_main():
-                return self.executor.submit(_call, function, condition, *arguments)
+        if self.conditions is not None:
+            known = self.conditions[condition]
+            return submit_unheard(self.executor, function, known, *arguments)
+        return submit_unheard(self.executor, _call, function, condition, *arguments)
 
 
 @contextlib.contextmanager
@@ -85,20 +69,15 @@ def make_pool(conditions: Mapping[str, Condition], workers: int) -> Iterator[Poo
     Raises:
         RequestError: naming what cannot be sent to processes.
     """
-    if all(condition.task.releases_gil for condition in conditions.values()):
-        pool = Pool(ThreadPoolExecutor(workers), conditions)
-    else:
-        context = multiprocessing.get_context(_START)
-        context.set_forkserver_preload(["qbumpers.simulation.shared_by_processes"])
-        sent = (packed(conditions),)
-        pool = Pool(ProcessPoolExecutor(workers, context, _begin_process, sent), None)
+    if not all(condition.task.releases_gil for condition in conditions.values()):
+        with process_pool(workers, _SHARED, _begin_process, packed(conditions)) as executor:
+            yield Pool(executor, None)
+        return
+    executor = ThreadPoolExecutor(workers)
     try:
-        yield pool
+        yield Pool(executor, conditions)
     finally:
-        processes = list((getattr(pool.executor, "_processes", None) or {}).values())
-        for process in processes:
-            process.terminate()
-        pool.executor.shutdown(wait=bool(processes), cancel_futures=True)
+        executor.shutdown(wait=False, cancel_futures=True)
 
 
 def some_finished(waiting: set[Future[Found]]) -> tuple[set[Future[Found]], set[Future[Found]]]:
@@ -116,46 +95,12 @@ def some_finished(waiting: set[Future[Found]]) -> tuple[set[Future[Found]], set[
             return done, others
 
 
-@contextlib.contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Ctrl-C waits until the end of the block, and processes begun within it never hear it."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    resource_tracker.ensure_running()  # it unblocks the signal when it begins
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    try:
-        # An interrupt that came before is raised here, and must not leave the signal blocked.
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextlib.contextmanager
-def _without_main() -> Iterator[None]:
-    """Processes begun within the block do not run the script again that this one runs.
-
-    What they need of it is sent to them. So scripts without a guard can have processes too, and
-    notebooks and standard input, which could not be run again.
-    """
-    main = sys.modules["__main__"]
-    sys.modules["__main__"] = types.ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main
-
-
 _sent: list[bytes] = []  # to this process
 
 
 def _begin_process(conditions: bytes) -> None:
-    """Leave Ctrl-C to the parent process, and end when it ends, even if it is killed."""
     _sent.append(conditions)
     warnings.simplefilter("ignore", KeptCodeWarning)  # the parent has said it
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_after_parent, daemon=True).start()
 
 
 @functools.cache
@@ -173,10 +118,3 @@ def _call(function: Callable[..., Any], condition: str, *arguments: Any) -> Any:
         except Exception:  # a class of the user's own, whose name means nothing elsewhere
             raise RuntimeError(f"{type(error).__name__}: {error}") from None
         raise
-
-
-def _end_after_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -11,6 +11,7 @@ from qbumpers.errors import RequestError, in_short, suggestion, unknown_name
 from qbumpers.imports import import_modules, module_and_name
 from qbumpers.registration import is_written_here
 from qbumpers.tasks.cliff_walking import cliff_walking, larger_cliff
+from qbumpers.tasks.hidden_goal import hidden_goal
 from qbumpers.tasks.identity import has_table
 from qbumpers.tasks.inventory import inventory
 from qbumpers.tasks.mountain_car import mountain_car
@@ -64,6 +65,7 @@ _tasks: dict[str, Callable[..., Task]] = {
     "frozen-lake": frozen_lake,
     "frozen-lake-8x8": frozen_lake_8x8,
     "taxi": taxi,
+    "hidden-goal": hidden_goal,
     "inventory": inventory,
     "random-mdp": random_mdp,
     "lunar-lander": _lunar_lander,

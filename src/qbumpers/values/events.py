@@ -7,6 +7,7 @@ import numpy as np
 
 from qbumpers.errors import RequestError
 from qbumpers.tasks import TabularTask
+from qbumpers.values.hidden import averaged
 from qbumpers.values.tabular import DECIMALS, TabularValues
 
 _CLOSE = 1e-13
@@ -67,7 +68,7 @@ def event_values(task: TabularTask, name: str) -> TabularValues:
     Raises:
         RequestError: if the task announces no such events.
     """
-    table = np.round(EVENT_ROWS[name](task), DECIMALS)
+    table = np.round(averaged(task, EVENT_ROWS[name](task)), DECIMALS)
     return TabularValues(table, 1.0, task.name, f"probability of {name} by value iteration")
 
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.tasks import TabularTask, Task
-from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import check_task
 from qbumpers.values.events import EVENT_ROWS, event_values
+from qbumpers.values.hidden import averaged, for_each_goal, learned_with_proposals
+from qbumpers.values.others import PER_PROPOSAL, numbered
 from qbumpers.values.tabular import DECIMALS, TabularValues
 
 
@@ -30,12 +31,15 @@ def solve(
     Args:
         task: what is to be solved.
         discount: of the values, in (0, 1]; the task's if None.
-        others: further rows that rules ask for, "safety" or "success", see
-            `qbumpers.values.events`; they are not discounted.
+        others: further rows that rules ask for: "safety" or "success", see
+            `qbumpers.values.events`, which are not discounted; "goals" or "proposals", see
+            `qbumpers.values.hidden`.
 
     Returns:
-        The values, with the further ones in `others`. Undiscounted, unreachable states without a
-        proper policy have value 0.
+        The values, with the further ones in `others`. If states look alike to the assistant, these
+        are of what it sees, the means over such states: best if the goal were to be known from the
+        next step on (Littman, Cassandra and Kaelbling 1995, QMDP). Undiscounted, unreachable states
+        without a proper policy have value 0.
 
     Raises:
         RequestError: if the task has no table of transitions, the discount is out of range, or
@@ -49,25 +53,65 @@ def solve(
             "see train_expert"
         )
     for name in others:
-        if name not in EVENT_ROWS:
-            raise unknown_name("further values", name, EVENT_ROWS)
+        if name not in SOLVED_ROWS:
+            raise unknown_name("further values", name, SOLVED_ROWS)
     tabular = cast(TabularTask, task)
     discount = task.discount if discount is None else discount
     if not 0 < discount <= 1:
         raise RequestError(f"discount = {discount!r}; it must lie in (0, 1]")
-    table = (
-        _policy_iteration(tabular, np.zeros(task.states, np.int64), discount)
-        if discount < 1
-        else _undiscounted(tabular)
-    )
+    further: dict[str, TabularValues] = {}
+    for name in others:
+        further |= solved_rows(tabular, name, discount)
     return TabularValues(
-        table=np.round(table, DECIMALS) + 0.0,  # + 0.0 turns -0.0 into 0.0
+        table=averaged(tabular, _solved(tabular, discount)),
         discount=discount,
         task=task.name,
-        method=f"exact dynamic programming{_of_estimate(tabular)}",
-        made_for=transitions_digest(tabular.dynamics()),
-        others={name: event_values(tabular, name) for name in others},
+        method=f"exact dynamic programming{_of_estimate(tabular)}{_of_states_alike(tabular)}",
+        made_for=tabular.identity(),
+        others=further,
     )
+
+
+SOLVED_ROWS = (*EVENT_ROWS, "goals", PER_PROPOSAL)
+"""What `solve` can give beside Q*, by the name that a rule asks for."""
+
+
+def solved_rows(task: TabularTask, name: str, discount: float) -> dict[str, TabularValues]:
+    """Further values beside Q*, by the names of their rows.
+
+    Args:
+        task: which is solved.
+        name: one of `SOLVED_ROWS`.
+        discount: of values that are returns, in (0, 1].
+
+    Raises:
+        RequestError: if the task announces no such events, or its values do not exist.
+    """
+    if name in EVENT_ROWS:
+        return {name: event_values(task, name)}
+    table = _solved(task, discount)
+    if name == PER_PROPOSAL:
+        rows, how = learned_with_proposals(task, table, discount), "Q-learning with a pilot"
+    else:
+        rows, how = for_each_goal(task, table), "exact dynamic programming"
+    return {
+        row: TabularValues(each, discount, task.name, how)
+        for row, each in zip(numbered(name, len(rows)), rows, strict=True)
+    }
+
+
+def _solved(task: TabularTask, discount: float) -> np.ndarray:
+    """Q* of every state, float64 [S, A]."""
+    table = (
+        _policy_iteration(task, np.zeros(task.states, np.int64), discount)
+        if discount < 1
+        else _undiscounted(task)
+    )
+    return np.round(table, DECIMALS) + 0.0  # + 0.0 turns -0.0 into 0.0
+
+
+def _of_states_alike(task: TabularTask) -> str:
+    return "" if task.seen is None else ", averaged over states that look alike"
 
 
 def _of_estimate(task: TabularTask) -> str:

@@ -1,6 +1,7 @@
 """Further action values beside Q*, by name, for rules that ask for them: checked, and kept with it.
 
-In a file their arrays are named "others.NAME.ARRAY", and their provenance is part of that of Q*.
+A name may stand for several: those of "goals" are "goals_0", "goals_1" and so on. In a file their
+arrays are named "others.NAME.ARRAY", and their provenance is part of that of Q*.
 """
 
 import json
@@ -12,6 +13,9 @@ import numpy as np
 from qbumpers.errors import RequestError
 
 _PREFIX = "others"
+
+PER_PROPOSAL = "proposals"
+"""Name of further values of which there is one for each proposal, "proposals_0" and so on."""
 
 
 def check_others(values: Any, shape_of: Callable[[Any], Any]) -> None:
@@ -80,21 +84,39 @@ def separated(
     return own, others
 
 
-def further_values(values: Any, name: str, assistant: str) -> Any:
+def numbered(name: str, count: int) -> list[str]:
+    """Names of the rows of further values that have several: NAME_0, NAME_1, ..."""
+    return [f"{name}_{place}" for place in range(count)]
+
+
+def further_values(values: Any, name: str, assistant: str, actions: int) -> dict[str, Any]:
     """Further values beside Q*, by name.
 
     Args:
         values: the assistant's Q*, of any kind; further ones are in `others`.
         name: which further values its rule asks for.
         assistant: its name, for the message.
+        actions: A.
+
+    Returns:
+        The values of that name, or else those of NAME_0, NAME_1, ... in this order.
 
     Raises:
-        RequestError: if the values hold none of the name.
+        RequestError: if the values hold none of the name, or not one for each proposal of
+            `PER_PROPOSAL`.
     """
     further = getattr(values, "others", {})
-    if name not in further:
+    if name in further and name != PER_PROPOSAL:
+        return {name: further[name]}
+    found = {row: further[row] for row in numbered(name, len(further)) if row in further}
+    if not found:
         known = ", ".join(further) or "none"
         raise RequestError(
             f"assistant {assistant}: it needs further values {name!r}; known: {known}"
         )
-    return further[name]
+    if name == PER_PROPOSAL and len(found) != actions:
+        raise RequestError(
+            f"assistant {assistant}: it needs further values {', '.join(numbered(name, actions))}, "
+            f"one for each proposal; known: {', '.join(further)}"
+        )
+    return found

@@ -10,8 +10,8 @@ from qbumpers.learners.interface import Table, Transition
 from qbumpers.learners.q_learning import QLearner
 from qbumpers.random_streams import ENVIRONMENT, LEARNER, draw, trial_streams
 from qbumpers.tasks.dynamics import TERMINATED, Dynamics, first_state, transition
-from qbumpers.tasks.identity import transitions_digest
 from qbumpers.tasks.task import Task
+from qbumpers.values.hidden import averaged
 from qbumpers.values.tabular import TabularValues
 
 
@@ -46,11 +46,11 @@ def learn_values(
     streams = trial_streams(seed, ["learn_values", task.digest()], range(1))[0]
     _learn(task.dynamics(), learner, episodes, streams, (0,) * task.actions, table)
     return TabularValues(
-        table=table,
+        table=averaged(task, table),
         discount=learner.discount,
         task=task.name,
         method=f"Q-learning, {episodes} episodes, seed {seed}",
-        made_for=transitions_digest(task.dynamics()),
+        made_for=task.identity(),
     )
 
 

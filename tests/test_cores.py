@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
+from qbumpers import cores
 from qbumpers.experiments.local import ThisMachine
-from qbumpers.simulation import cores
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_a_pinned_process_uses_its_own_cores_only():
     core = min(os.sched_getaffinity(0))
     program = (
         f"import os; os.sched_setaffinity(0, {{{core}}})\n"
-        "from qbumpers.simulation.cores import usable_cores; print(usable_cores())"
+        "from qbumpers.cores import usable_cores; print(usable_cores())"
     )
     finished = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
