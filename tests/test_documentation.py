@@ -320,6 +320,16 @@ def test_the_page_on_learner_aware_bumpers_says_what_was_measured(tmp_path):
 
 
 @pytest.mark.slow
+def test_learner_aware_bumpers_can_be_measured_again():
+    command = [sys.executable, str(DOCS / "run_learner_aware.py"), "points", "robust"]
+    printed = subprocess.run(
+        [*command, "--trials", "2"], capture_output=True, text=True, check=True
+    ).stdout
+    assert len(re.findall(r"assisted and more than .*: (?:reached|missed)", printed)) == 3
+    assert "estimated values" in printed
+
+
+@pytest.mark.slow
 def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
     pictures = make("make_pictures.py", tmp_path)
     assert pictures
