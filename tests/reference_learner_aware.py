@@ -98,11 +98,11 @@ class PlainLearnerAware:
             total += (share / mirror.rate * expected) if share >= 1e-3 else 0.0
         return total
 
-    def help(self, situation, noise, lost, room, shares):
+    def help(self, situation, noise, lost, allowed, shares):
         values = situation.values.tolist()
         merits: list[float | None] = [None] * len(values)
         for action, value in enumerate(values):
-            if value > values[situation.proposed] and lost[action] < room:
+            if value > values[situation.proposed] and lost[action] < allowed:
                 credit = sum(
                     share * self.target(mirror, situation, action)
                     for mirror, share in shares.items()
@@ -119,7 +119,7 @@ class PlainLearnerAware:
         if values[proposed] == max(values):
             return proposed, 0.0
         self.loss = situation.start_value - self.v_min
-        room = self.alpha * self.loss
+        allowed = self.alpha * self.loss
         lost = [situation.start_value - situation.earned - situation.discount * v for v in values]
         chances = self.chances(situation.state, proposed)
         shares = dict.fromkeys(self.mirrors, 0.0)
@@ -127,11 +127,11 @@ class PlainLearnerAware:
         for (mirror, _, kind), chance in chances.items():
             shares[mirror] += chance
             unnoticed[kind] += chance if mirror.perception == "transition" else 0.0
-        action = self.help(situation, noise, lost, room, shares)
+        action = self.help(situation, noise, lost, allowed, shares)
         worth = self.harm(situation, action, shares) - self.harm(situation, proposed, shares)
         if values[action] - values[proposed] < self.alpha * worth:
             return proposed, 0.0
-        ratio = lost[proposed] / room if room else 1.0
+        ratio = lost[proposed] / allowed if allowed else 1.0
         due = logistic(ratio, 0.999) if 0 < ratio < 1 else float(ratio >= 1)
         passing = (unnoticed["slip"] + unnoticed["meant"] / 2) * (1 - due)
         return (action if noise.coin < 1 - passing else proposed), 1 - passing

@@ -141,13 +141,13 @@ def lost_with(situation: Situation, action: int) -> float:
 
 @compiled
 def least_misleading(
-    situation: Situation, noise: Noise, room: float, shares: np.ndarray, targets: np.ndarray
+    situation: Situation, noise: Noise, allowed: float, shares: np.ndarray, targets: np.ndarray
 ) -> int:
     """The override: the better action within the floor that misleads least, else a best one."""
     values, proposed = situation.values, situation.proposed
     merits = np.full(len(values), -np.inf)
     for action in range(len(values)):
-        if values[action] > values[proposed] and lost_with(situation, action) < room:
+        if values[action] > values[proposed] and lost_with(situation, action) < allowed:
             merits[action] = _LEANING * values[action] - misled_credit(shares, targets[action])
     best = best_value(merits)
     if best == -np.inf:
@@ -199,12 +199,12 @@ def weighed(
         outlook: where the actions lead.
     """
     proposed, loss = situation.proposed, situation.start_value - v_min
-    room = alpha * loss
+    allowed = alpha * loss
     reading = read(mirrors, situation.state, proposed, loss)
-    action = least_misleading(situation, noise, room, reading.shares, outlook.targets)
+    action = least_misleading(situation, noise, allowed, reading.shares, outlook.targets)
     if is_lesson(situation, action, alpha, loss, mirrors, reading.shares, outlook):
         return Decision(proposed, 0.0)
-    due = override_probability(lost_with(situation, proposed), room, _SURE, True)
+    due = override_probability(lost_with(situation, proposed), allowed, _SURE, True)
     probability = 1 - (reading.slip + _LENIENCE * reading.meant) * (1 - due)
     return Decision(action if noise.coin < probability else proposed, probability)
 
