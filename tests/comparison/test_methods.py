@@ -62,6 +62,7 @@ def test_settings_are_allowed_and_no_two_are_equal(name, scales):
         ("risk-and-novelty", "inventory", "announces no success"),
         ("trajectory-bumpers", "taxi", "300 states"),
         ("trajectory-bumpers", "hidden-goal", "what the assistant sees"),
+        ("learner-aware-bumpers", "hidden-goal", "what the assistant sees"),
         ("better-for-all-goals", "taxi", "sees all"),
         ("closest-acceptable-unknown-goal", "hidden-goal", ""),
         ("undo", "cliff-walking", ""),

@@ -72,6 +72,11 @@ def _rooms(scales: Scales) -> Settings:
     return [_bumpers(scales, room) for room in spaced(1 / 32, WIDEST)]
 
 
+def _aware(scales: Scales) -> Settings:
+    floor = _short(scales.lowest_start - scales.spread)
+    return [{"alpha": room, "v_min": floor} for room in spaced(1 / 32, WIDEST)]
+
+
 def _over_bumpers(scales: Scales, room: float = STRONG) -> dict[str, Any]:
     return {"name": BASELINE, **_bumpers(scales, room)}
 
@@ -129,15 +134,25 @@ def _all_seen(scales: Scales) -> str:
     return "the assistant sees all, the goal too" if scales.task.seen is None else ""
 
 
+def _partly_seen(scales: Scales) -> str:
+    if scales.task.seen is None:
+        return ""
+    return "what the assistant sees of a state does not tell where a step leads"
+
+
 def _no_path(scales: Scales) -> str:
     if scales.task.seen is not None:
-        return "what the assistant sees of a state does not tell where a step leads"
+        return _partly_seen(scales)
     starts = int((scales.task.start > 0).sum())
     return (
         "" if starts == 1 else f"an episode may start in {starts} states, so there is no one path"
     )
 
 
+_AWARE = (
+    "1/32 to 32, each 2.7 times the one before; v_min lies one spread of Q* below the lowest "
+    "V*(s_0)"
+)
 _OPTION = "halfway between neighbours among the distinct values of"
 
 METHODS: Mapping[str, Method] = MappingProxyType(
@@ -148,6 +163,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             "the lowest V*(s_0)",
             _rooms,
         ),
+        "learner-aware-bumpers": Method("alpha", _AWARE, _aware, _partly_seen),
+        "model-free-learner-aware-bumpers": Method("alpha", _AWARE, _aware, _partly_seen),
         "hard-bumpers": Method("room = alpha (V*(s_0) - v_min)", "as of the bumpers", _rooms),
         "local-q-thresholding": Method(
             "alpha",

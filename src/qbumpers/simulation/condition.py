@@ -260,7 +260,7 @@ def had_by(task: Task) -> dict[str, bool]:
     """Whether a task has it, for each of what a rule may need."""
     return {
         "states": task.states > 0,
-        "dynamics": task.states > 0,
+        "dynamics": task.states > 0 and task.seen is None,  # rules count states as they are seen
         "distance": task.has_distance,
         "undo": task.undoable,
         "no_op": task.no_op >= 0,
