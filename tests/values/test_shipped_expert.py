@@ -28,6 +28,7 @@ def lands(expert, environment, generator, epsilon):
             return info["success"]
 
 
+@pytest.mark.slow
 def test_it_lands_nearly_always_with_some_random_actions():
     """True rate at least 0.98 if it is as good as its record; 200 episodes then rarely miss 10."""
     expert, generator = shipped_expert("lunar-lander"), np.random.default_rng(5)
