@@ -3,6 +3,7 @@
 # Their commands register.
 from qbumpers.cli import experiments as experiments
 from qbumpers.cli import expert as expert
+from qbumpers.cli import fitting as fitting
 from qbumpers.cli import listing as listing
 from qbumpers.cli import tuning as tuning
 from qbumpers.cli.application import application, main

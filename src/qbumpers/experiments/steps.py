@@ -88,7 +88,9 @@ def _from_minari(source: str | Path) -> dict[str, Step]:
     dataset = _dataset(source)
     states, actions = dataset.observation_space, dataset.action_space
     if not {"n", "start"} <= {*vars(states)}:
-        raise RequestError(f"steps = {str(source)!r}: states are not numbered; vectors cannot be fitted")
+        raise RequestError(
+            f"steps = {str(source)!r}: states are not numbered; vectors cannot be fitted"
+        )
     parts: dict[str, list[Step]] = {}
     for episode in dataset.iterate_episodes():
         missing = {*INFOS, "trial", "episode"} - {*(episode.infos or {})}
@@ -98,7 +100,9 @@ def _from_minari(source: str | Path) -> dict[str, Step]:
                 "dataset of export_recording is needed"
             )
         name = str(int(episode.infos["trial"][0]))
-        parts.setdefault(name, []).append(_episode_of(episode, int(states.start), int(actions.start)))
+        parts.setdefault(name, []).append(
+            _episode_of(episode, int(states.start), int(actions.start))
+        )
     return {name: _joined(episodes) for name, episodes in parts.items()}
 
 

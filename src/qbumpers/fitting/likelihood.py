@@ -3,9 +3,9 @@
 One pass over the record. The record decides what a learner's memory is, unless something that
 happened to the learner is hidden: whether it noticed an override, if it notices some of them; what
 an on-policy learner meant to do next when an episode was cut. Then the pass is a particle filter:
-several learners that live through the same record, each with chance of its own, of which those that
-explain the proposals survive (a bootstrap filter: Gordon, Salmond and Smith 1993). Its likelihood
-is unbiased. With nothing hidden a single learner is the whole filter, and nothing is left to chance.
+several learners live through the same record, each with chance of its own, and those that explain
+the proposals survive (a bootstrap filter: Gordon, Salmond and Smith 1993). Its likelihood is
+unbiased. With nothing hidden a single learner is the whole filter, and nothing is left to chance.
 """
 
 import math
@@ -78,16 +78,18 @@ def _probability(
     """Probability of the action that was proposed at a step."""
     policy(stack.settings, memory, choices.state[step], rates, out)
     moved_policy(stack.motor, out, last, out)
-    return (1 - stack.lapse) * out[choices.proposed[step]] + stack.lapse / len(out)
+    return float((1 - stack.lapse) * out[choices.proposed[step]] + stack.lapse / len(out))
 
 
 @inlined
-def _is_followed(choices: Choices, step: int) -> bool:
-    """Whether the episode of a step goes on."""
+def _is_followed(choices: Choices, step: int, happened: Transition) -> bool:
+    """Whether the episode of a step goes on, from where the learner believes it to."""
     following = step + 1
     if following >= len(choices.episode):
         return False
-    return choices.episode[following] == choices.episode[step]
+    if choices.episode[following] != choices.episode[step]:
+        return False
+    return choices.state[following] == happened.next_state
 
 
 @called
@@ -103,20 +105,17 @@ def _live_through(
     proposed, executed = choices.proposed[step], choices.executed[step]
     undone = choices.undone[step]
     coin = noticing(stack.perception, executed != proposed or undone, stream)
-    experience = perceive(
-        stack.perception, proposed, executed, undone, choices.reward[step], coin
-    )
+    experience = perceive(stack.perception, proposed, executed, undone, choices.reward[step], coin)
     ahead, next_action = -1.0, -1
     if experience.action < 0:
         return ahead
     happened = believed(
         experience, choices.state[step], choices.next_state[step], choices.terminated[step]
     )
-    if order != WITHHELD and not happened.terminated and _is_followed(choices, step):
-        if happened.next_state == choices.state[step + 1]:
-            next_action = choices.proposed[step + 1]
-            if order == BEFORE:
-                ahead = _probability(stack, memory, choices, step + 1, proposed, rates, out)
+    if order != WITHHELD and not happened.terminated and _is_followed(choices, step, happened):
+        next_action = choices.proposed[step + 1]
+        if order == BEFORE:
+            ahead = _probability(stack, memory, choices, step + 1, proposed, rates, out)
     learn(
         stack.settings, memory,
         Transition(

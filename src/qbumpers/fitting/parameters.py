@@ -19,6 +19,11 @@ from qbumpers.registration import as_numbers
 FIXED = ("discount", "initial_value", "fraction")
 """Last parts of names that are not free unless they are asked for."""
 
+LAPSE = 0.001
+"""Lapse rate that every learner has unless it is said otherwise.
+
+Without one, a single choice that a fitted learner excludes makes a whole record impossible."""
+
 _AROUND = ("perception", "motor", "lapse")
 _LEAST, _MOST, _FARTHEST = 1e-4, 1e2, 1e2
 
@@ -79,7 +84,7 @@ def make_stack(learner: str, perception: Perception, fixed: Mapping[str, float])
         RequestError: if there is no such learner or parameter, or a number is out of range.
     """
     kind: Any = learner_type(learner).settings_type
-    stack = Stack(as_numbers(kind()), as_numbers(perception), Motor(), 0.0)
+    stack = Stack(as_numbers(kind()), as_numbers(perception), Motor(), LAPSE)
     known = parameters_of(stack)
     for name, number in fixed.items():
         parameter = known_parameter(known, name, learner)
@@ -153,9 +158,7 @@ def _leaves(kind: Any, prefix: str) -> Iterator[Parameter]:
 
 def _bounds(hint: Any) -> tuple[float, float]:
     """Bounds written as `Annotated[float, Field(ge=0, le=1)]`."""
-    stated = [
-        bound for each in get_args(hint)[1:] for bound in getattr(each, "metadata", (each,))
-    ]
+    stated = [bound for each in get_args(hint)[1:] for bound in getattr(each, "metadata", (each,))]
     low = [getattr(bound, name, None) for bound in stated for name in ("ge", "gt")]
     high = [getattr(bound, name, None) for bound in stated for name in ("le", "lt")]
     return (
