@@ -9,12 +9,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from qbumpers.cli.application import application, stoppable
-from qbumpers.cli.console import OUTPUT, table
+from qbumpers.cli.console import OUTPUT, print_warning, table
 from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
     from qbumpers.fitting import Fitted
+
+_LARGE_ERROR = 1.0  # of a log-likelihood; twice that tells two models apart
 
 
 @application.command()
@@ -70,6 +72,10 @@ def fit(
     folds: Annotated[
         int, typer.Option(help="Every so many episodes are held out together.", metavar="N", min=2)
     ] = 2,
+    particles: Annotated[
+        int,
+        typer.Option(help="Simulated learners, if something is hidden.", metavar="N", min=1),
+    ] = 100,
     seed: Annotated[
         int, typer.Option(help="Of starting points and particles.", metavar="N", min=0)
     ] = 0,
@@ -105,6 +111,7 @@ def fit(
                 fixed=_numbers(fixed),
                 training=training,
                 folds=folds,
+                particles=particles,
                 seed=seed,
                 report=lambda done: bar.update(task, completed=done.done, total=done.of),
             )
@@ -112,6 +119,7 @@ def fit(
         OUTPUT.print(f"\nEstimates of [bold]{found.best}[/bold], means over participants:")
         OUTPUT.print(_estimates(found))
         OUTPUT.print(_verdict(found), soft_wrap=True)
+        _warn_of_error(found)
         if out is not None:
             _write(found, out)
 
@@ -177,6 +185,18 @@ def _verdict(found: "Fitted") -> str:
     if len(found.models["model"]) and found.models["low"].drop_nulls().len() < 2:
         return "One participant says nothing about others: no difference has an interval."
     return f"{found.best} explains these participants significantly better than the others."
+
+
+def _warn_of_error(found: "Fitted") -> None:
+    """Say so if the particle filter is too coarse for what it is used for."""
+    rows = found.scores.sort("error", descending=True).iter_rows(named=True)
+    worst = next(rows)
+    if worst["error"] > _LARGE_ERROR:
+        print_warning(
+            f"something is hidden from {worst['model']}: the log-likelihood of participant "
+            f"{worst['participant']} has an error of {worst['error']:.1f}, which is too much for a "
+            "comparison; give more --particles"
+        )
 
 
 def _write(found: "Fitted", folder: Path) -> None:

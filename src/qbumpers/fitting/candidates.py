@@ -1,6 +1,7 @@
 """A learner, with its perception, as an explanation of one participant's proposals."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -89,9 +90,15 @@ def _described(perception: Perception) -> str:
 
 
 def suits(learner: str, perception: str | Perception) -> bool:
-    """Whether a learner can have a perception."""
+    """Whether a learner can have a perception.
+
+    Raises:
+        RequestError: if there is no such learner or perception.
+    """
+    kind = learner_type(learner)
+    checked_perception(replace(kind, imitates=False), perception)
     try:
-        checked_perception(learner_type(learner), perception)
+        checked_perception(kind, perception)
     except RequestError:
         return False
     return True

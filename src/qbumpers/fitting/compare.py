@@ -9,7 +9,7 @@ import polars as pl
 
 from qbumpers.analysis.statistics import UNKNOWN, bootstrap_interval
 from qbumpers.decisions import Step
-from qbumpers.errors import RequestError, whole_number
+from qbumpers.errors import RequestError, counted, whole_number
 from qbumpers.fitting.candidates import (
     Candidate,
     Likelihood,
@@ -87,7 +87,7 @@ def fit(
     fixed: Mapping[str, float] | None = None,
     training: int | None = None,
     folds: int = 2,
-    particles: int = 50,
+    particles: int = 100,
     intervals: bool = True,
     seed: int = 0,
     report: Callable[[Progress], None] | None = None,
@@ -163,7 +163,8 @@ def _person(name: str, steps: Step, training: int | None, folds: int) -> _Person
     episodes = len(np.unique(choices.episode))
     if episodes < folds:
         raise RequestError(
-            f"folds = {folds}; participant {name} has {episodes} episodes, and each fold needs one"
+            f"folds = {folds}; participant {name} has {counted(episodes, 'episode')}, and each "
+            "fold needs one"
         )
     if training is not None:
         _check_whole(training=(training, 1))

@@ -6,7 +6,7 @@ best of many points that are drawn from the whole range. Intervals are profile l
 belongs to the interval if the best likelihood with it lies less than half a quantile of chi-squared
 with one degree of freedom below the maximum. That is right for many choices and parameters that the
 likelihood depends on smoothly; at a bound, and of a learning rate whose likelihood jumps, it is
-approximate.
+approximate, and the interval spans the gaps between the values that belong to it.
 """
 
 import math
@@ -25,7 +25,8 @@ from qbumpers.random_streams import content_words
 _DRAWN_POINTS, _BEST_POINTS = 32, 3  # per parameter; from how many the search begins
 _REPEATS = 8  # of a particle filter, for its error
 _IMPOSSIBLE = 1e6  # by which a search is led away from each proposal that could not be
-_STEPS_OUT, _HALVINGS = 8, 8
+_POINTS_OUT, _NEAREST, _HALVINGS = 80, 2.0**-14, 6
+_HOPELESS = 20.0  # so far below what is compatible that nothing beyond is looked at
 
 
 class Estimate(NamedTuple):
@@ -192,44 +193,65 @@ def interval(
         p.coordinate(v) for p, v in zip(parameters, found.parameters.values(), strict=True)
     ])  # fmt: skip
     most = loss(best) + float(scipy.stats.chi2.ppf(confidence, 1)) / 2
-    ends = [_profile_end(loss, parameters, best, place, end, most) for end in (0, 1)]
+    ends = [
+        _profile_end(_Profile(loss, parameters, best, place), float(best[place]), limit, most)
+        for limit in parameters[place].ends()
+    ]
     return Interval(*(parameters[place].value(end) for end in ends))
 
 
-def _profile_end(
-    loss: Callable[[np.ndarray], float], parameters: Sequence[Parameter], best: np.ndarray,
-    place: int, end: int, most: float,
-) -> float:  # fmt: skip
-    """The coordinate at one end of an interval: doubling steps outwards, then halving."""
-    low, high = np.transpose([parameter.ends() for parameter in parameters])
-    limit = (low, high)[end][place]
-    others = np.arange(len(best)) != place
-    nuisance = best[others]
+class _Profile:
+    """The least loss at a coordinate of one parameter, over all others."""
 
-    def profile(coordinate: float, start: np.ndarray) -> tuple[float, np.ndarray]:
-        point = np.insert(start, place, coordinate)
-        if not others.any():
-            return loss(point), start
-        within = _descended(
-            lambda rest: loss(np.insert(rest, place, coordinate)), start, low[others], high[others]
-        )
-        return loss(np.insert(within, place, coordinate)), within
+    def __init__(
+        self, loss: Callable[[np.ndarray], float], parameters: Sequence[Parameter],
+        best: np.ndarray, place: int,
+    ) -> None:  # fmt: skip
+        low, high = np.transpose([parameter.ends() for parameter in parameters])
+        others = np.arange(len(best)) != place
+        self._loss, self._place = loss, place
+        self._low, self._high, self._start = low[others], high[others], best[others]
 
-    inside, step = float(best[place]), (limit - best[place]) / 2**_STEPS_OUT
-    outside = inside
-    for number in range(_STEPS_OUT + 1):
-        outside = float(best[place] + step * 2**number)
-        reached, moved = profile(outside, nuisance)
-        if reached > most:
+    def reaches(self, coordinate: float, most: float) -> float:
+        """A loss at a coordinate, the least one if that is needed to be at most `most`.
+
+        The others are then looked for from where they were when that was reached the last time.
+        """
+
+        def at(others: np.ndarray) -> float:
+            return self._loss(np.insert(others, self._place, coordinate))
+
+        found = at(self._start)
+        if found <= most or not len(self._start):
+            return found
+        moved = _descended(at, self._start, self._low, self._high)
+        found = at(moved)
+        if found <= most:
+            self._start = moved
+        return found
+
+
+def _profile_end(profile: _Profile, best: float, limit: float, most: float) -> float:
+    """The coordinate at one end of an interval.
+
+    The likelihood may jump, and there are gaps between values that are compatible with the choices:
+    so what lies beyond the first gap is looked at too, in growing steps, and the last gap is
+    narrowed by halving.
+    """
+    inside, outside = best, limit
+    for share in np.geomspace(_NEAREST, 1.0, _POINTS_OUT):
+        point = best + float(share) * (limit - best)
+        reached = profile.reaches(point, most)
+        if reached <= most:
+            inside, outside = point, limit
+        elif outside == limit:
+            outside = point
+        if reached > most + _HOPELESS:
             break
-        inside, nuisance = outside, moved
-    else:
-        return float(limit)
-    for _ in range(_HALVINGS):
+    for _ in range(_HALVINGS if inside != limit else 0):
         middle = (inside + outside) / 2
-        reached, moved = profile(middle, nuisance)
-        if reached > most:
-            outside = middle
+        if profile.reaches(middle, most) <= most:
+            inside = middle
         else:
-            inside, nuisance = middle, moved
-    return (inside + outside) / 2
+            outside = middle
+    return inside
