@@ -1,9 +1,10 @@
 """What `qbumpers fit` recovers: `python docs/run_fitting.py > docs/data/fitting.txt`.
 
 Simulated participants at Cliff Walking, whose learner is known, are explained by every learner. It
-takes about half an hour on one core.
+takes about half an hour on one core. The parts recovery, confusion and strangers can be named.
 """
 
+import sys
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -21,6 +22,7 @@ ASSISTANT = make_assistant("stochastic-q-bumpers", alpha=0.5)
 SHAPE = Shape(48, 0, (0,) * 4)
 LEARNERS = ("q-learning", "sarsa", "expected-sarsa", "softmax-q-learning", "actor-critic",
             "model-based", "two-rate")  # fmt: skip
+PEOPLE, PARTICLES = 4, 30
 SEEN = ("transition", "observant", "interruption")
 CONSTANT = ("epsilon", "learning_rate")
 RANGES = {
@@ -150,7 +152,7 @@ def confusion(title: str, truths: Mapping[str, Mapping[str, Step]], **models: An
     """Print which model wins for participants of each kind."""
     print(f"\n{title}")
     for truth, people in truths.items():
-        found = fit(people, intervals=False, **models)
+        found = fit(people, intervals=False, particles=PARTICLES, **models)
         counts = sorted(winners(found.scores).items(), key=lambda each: -each[1])
         shown = ", ".join(f"{model} {count}" for model, count in counts)
         probability = found.models["probability"][0]
@@ -167,35 +169,48 @@ def of_kind(
     return {str(trial): played(learner, trial, episodes, perception) for trial in range(people)}
 
 
-def main() -> None:
-    """Print everything."""
-    print("RECOVERY")
-    recovery("q-learning", 40, (5, 20, 80))
-    recovery("softmax-q-learning", 40, (5, 20, 80))
-    print("\nCONFUSION")
+def recoveries() -> None:
+    """Print what is known of parameters."""
+    print("RECOVERY: how far estimates are from the truth", flush=True)
+    recovery("q-learning", 20, (5, 20, 80))
+    recovery("softmax-q-learning", 10, (5, 20))
+
+
+def confusions() -> None:
+    """Print what is known of learners and perceptions."""
+    print("CONFUSION: which model wins, for how many participants", flush=True)
     for episodes in (5, 20):
         confusion(
-            f"learners, 8 participants of {episodes} episodes: how often each model wins",
-            {name: of_kind(name, 8, episodes) for name in LEARNERS},
+            f"learners, {PEOPLE} participants of {episodes} episodes each",
+            {name: of_kind(name, PEOPLE, episodes) for name in LEARNERS},
             learners=LEARNERS, perceptions=["transition"],
         )  # fmt: skip
-    for episodes in (5, 20):
         confusion(
-            f"perceptions of q-learning, 8 participants of {episodes} episodes",
-            {seen: of_kind("q-learning", 8, episodes, seen) for seen in SEEN},
+            f"perceptions of q-learning, {PEOPLE} participants of {episodes} episodes each",
+            {seen: of_kind("q-learning", PEOPLE, episodes, seen) for seen in SEEN},
             learners=["q-learning"], perceptions=SEEN,
         )  # fmt: skip
-    print("\nNONE OF THE MODELS")
-    confusion(
-        "a learner of habits, 8 participants of 20 episodes",
-        {"habit": {str(t): played(HABIT(), t, 20) for t in range(8)}},
-        learners=LEARNERS, perceptions=["transition"],
-    )  # fmt: skip
-    confusion(
-        "the same with its own kind among the models",
-        {"habit": {str(t): played(HABIT(), t, 20) for t in range(8)}},
-        learners=[*LEARNERS, "habit"], perceptions=["transition"],
-    )  # fmt: skip
+
+
+def strangers() -> None:
+    """Print what is found if none of the models is right, and if one is."""
+    print("NONE OF THE MODELS: a learner of habits", flush=True)
+    people = {str(trial): played(HABIT(), trial, 20) for trial in range(PEOPLE)}
+    for models in (LEARNERS, (*LEARNERS, "habit")):
+        title = f"{PEOPLE} participants of 20 episodes, {len(models)} models"
+        confusion(title, {"habit": people}, learners=models, perceptions=["transition"])
+
+
+PARTS = {"recovery": recoveries, "confusion": confusions, "strangers": strangers}
+
+
+def main() -> None:
+    """Print the parts that are named, or all."""
+    names = sys.argv[1:] or [*PARTS]
+    for number, name in enumerate(names):
+        if number:
+            print()
+        PARTS[name]()
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ def test_the_learner_that_made_the_choices_is_found(call, steps, tmp_path):
     assert status == 0
     assert "2 participants" in output
     assert "Estimates of q-learning, transition" in words(output)
-    assert "q-learning, transition explains these participants" in words(output)
+    assert "would take 5 participants" in words(output)
     scores = pl.read_csv(tmp_path / "tables" / "scores.csv")
     assert scores.height == 2 * 3
     parameters = pl.read_csv(tmp_path / "tables" / "parameters.csv")

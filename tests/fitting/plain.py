@@ -7,6 +7,7 @@ import numpy as np
 
 from qbumpers.decisions import Step
 from qbumpers.tasks.dynamics import TERMINATED
+from tests.narrowing import present
 
 
 def greedy_shares(values, epsilon):
@@ -54,7 +55,6 @@ def log_likelihoods(
         if step.overridden and 0 < perception.notices < 1:
             sees = next(noticed)
         action, reward, back = perceived(step, perception, sees)
-        goes_on = after is not None and after.episode == step.episode
         if action is None:
             continue
         target = step.state if back else step.next_state
@@ -62,10 +62,10 @@ def log_likelihoods(
         if back or not step.events & TERMINATED:
             future = max(of(target))
             if on_policy:
-                assert goes_on, "the next action of a learner of SARSA was not recorded"
-                assert after.state == target
+                following = present(after)  # or the next action was not recorded
+                assert (following.episode, following.state) == (step.episode, target)
                 ahead = shares(of(target))
-                future = of(target)[after.proposed]
+                future = of(target)[following.proposed]
         old = of(step.state)[action]
         of(step.state)[action] = old + rate * (reward + discount * future - old)
     return found

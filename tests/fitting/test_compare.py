@@ -56,19 +56,26 @@ def table(**held_out):
 
 
 def test_models_are_compared_over_participants():
-    found = compare(table(good=[-5.0, -6.0, -7.0], bad=[-8.0, -5.5, -9.0], no=[-np.inf, -9, -9]))
+    found = compare(
+        table(
+            good=[-5.0, -6.0, -7.0, -6.0, -6.0],
+            bad=[-8.0, -5.5, -9.0, -7.0, -7.0],
+            no=[-np.inf, -9, -9, -9, -9],
+        )
+    )
     good, bad, impossible = found.iter_rows(named=True)
     assert [good["model"], bad["model"], impossible["model"]] == ["good", "bad", "no"]
-    assert (good["best_for"], bad["best_for"], impossible["best_for"]) == (2, 1, 0)
+    assert (good["best_for"], bad["best_for"], impossible["best_for"]) == (4, 1, 0)
     assert (good["behind"], good["low"], good["high"]) == (0.0, 0.0, 0.0)
-    assert bad["behind"] == pytest.approx((-3 + 0.5 - 2) / 3)
+    assert bad["behind"] == pytest.approx((-3 + 0.5 - 2 - 1 - 1) / 5)
     assert -3 <= bad["low"] < bad["behind"] < bad["high"] <= 0.5
-    assert good["probability"] == pytest.approx(math.exp(-18 / 30))
+    assert good["probability"] == pytest.approx(math.exp(-30 / 50))
     assert (impossible["behind"], impossible["low"]) == (-math.inf, None)
 
 
-def test_one_participant_gives_no_interval():
-    assert compare(table(good=[-5.0], bad=[-8.0]))["low"].to_list() == [None, None]
+def test_few_participants_give_no_interval():
+    found = compare(table(good=[-5.0] * 4, bad=[-8.0, -9.0, -8.0, -8.0]))
+    assert found["low"].to_list() == [None, None]
 
 
 def test_perceptions_that_suit_are_compared_if_any_step_was_overridden():

@@ -173,17 +173,19 @@ def _estimates(found: "Fitted") -> Table:
 
 def _verdict(found: "Fitted") -> str:
     """What can be said of the best model against the others."""
+    from qbumpers.fitting.compare import FEWEST
+
+    if found.models["learner"][0] == "chance":
+        return "No learner explains the choices better than chance."
+    if found.scores["participant"].n_unique() < FEWEST:
+        return f"That the best model is the best for others too would take {FEWEST} participants."
     alike = [
         row["model"]
         for row in found.models.iter_rows(named=True)
         if row["model"] != found.best and row["high"] is not None and row["high"] >= 0
     ]
-    if found.models["learner"][0] == "chance":
-        return "No learner explains the choices better than chance."
     if alike:
         return f"{found.best} is not told apart from: {'; '.join(alike)}."
-    if len(found.models["model"]) and found.models["low"].drop_nulls().len() < 2:
-        return "One participant says nothing about others: no difference has an interval."
     return f"{found.best} explains these participants significantly better than the others."
 
 

@@ -26,6 +26,9 @@ from qbumpers.random_streams import content_words
 PERCEPTIONS = ("transition", "observant", "interruption")
 """Perceptions that are compared if none are named; the others add a penalty of unknown size."""
 
+FEWEST = 5
+"""Participants without whom a bootstrap over them means nothing."""
+
 CHANCE = "chance"
 """Name of the comparison with every action alike."""
 
@@ -104,8 +107,8 @@ def fit(
     high, the interval at 95% for the best model. `models` has model, learner, perception,
     log_likelihood, bic and held_out summed over participants; probability, the geometric mean of
     what held-out proposals were given; behind, the mean difference of held_out per participant from
-    the best model, with low and high from a bootstrap over participants; and best_for, for how many
-    participants it is the best.
+    the best model, with low and high from a bootstrap over participants if there are `FEWEST`; and
+    best_for, for how many participants it is the best.
 
     Args:
         participants: a table of steps of each, for instance of `load_steps`.
@@ -298,7 +301,7 @@ def compare(scores: pl.DataFrame, seed: int = 0) -> pl.DataFrame:
 
 def _behind(differences: np.ndarray, words: Sequence[int]) -> dict[str, float | None]:
     found = UNKNOWN._replace(mean=float(differences.mean()))
-    if np.isfinite(differences).all():
+    if len(differences) >= FEWEST and np.isfinite(differences).all():
         generator = np.random.default_rng(words)
         found = bootstrap_interval([differences], np.mean, generator, method="percentile")
     low, high = (None if math.isnan(each) else each for each in found[1:])

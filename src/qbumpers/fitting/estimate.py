@@ -23,9 +23,10 @@ from qbumpers.fitting.parameters import Parameter, parameters_of, values_of, wit
 from qbumpers.random_streams import content_words
 
 _DRAWN_POINTS, _BEST_POINTS = 32, 3  # per parameter; from how many the search begins
+_EVALUATIONS, _PROFILE_EVALUATIONS = 150, 50  # per parameter, of one descent
 _REPEATS = 8  # of a particle filter, for its error
 _IMPOSSIBLE = 1e6  # by which a search is led away from each proposal that could not be
-_POINTS_OUT, _NEAREST, _HALVINGS = 80, 2.0**-14, 6
+_POINTS_OUT, _NEAREST, _HALVINGS = 40, 2.0**-13, 6
 _HOPELESS = 20.0  # so far below what is compatible that nothing beyond is looked at
 
 
@@ -124,13 +125,14 @@ def _least(
     drawn = generator.uniform(low, high, (_DRAWN_POINTS * len(parameters), len(parameters)))
     order = np.argsort([loss(point) for point in drawn], kind="stable")
     starts = [np.asarray(default), *drawn[order[:_BEST_POINTS]]]
-    ends = [_descended(loss, start, low, high) for start in starts]
+    ends = [_descended(loss, start, low, high, _EVALUATIONS) for start in starts]
     return min(ends, key=loss)
 
 
 def _descended(
-    loss: Callable[[np.ndarray], float], start: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
+    loss: Callable[[np.ndarray], float], start: np.ndarray, low: np.ndarray, high: np.ndarray,
+    evaluations: int,
+) -> np.ndarray:  # fmt: skip
     """Where the simplex of Nelder and Mead ends that begins at `start`."""
     size = np.where(start + 0.1 * (high - low) <= high, 0.1, -0.1) * (high - low)
     simplex = np.vstack([start, start + np.diag(size)])
@@ -140,7 +142,7 @@ def _descended(
         method="Nelder-Mead",
         bounds=[*zip(low, high, strict=True)],
         options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-3,
-                 "maxfev": 150 * len(start)},
+                 "maxfev": evaluations * len(start)},
     ).x  # fmt: skip
 
 
@@ -224,7 +226,7 @@ class _Profile:
         found = at(self._start)
         if found <= most or not len(self._start):
             return found
-        moved = _descended(at, self._start, self._low, self._high)
+        moved = _descended(at, self._start, self._low, self._high, _PROFILE_EVALUATIONS)
         found = at(moved)
         if found <= most:
             self._start = moved
