@@ -24,7 +24,9 @@ LEARNERS = ("q-learning", "sarsa", "expected-sarsa", "softmax-q-learning", "acto
             "model-based", "two-rate")  # fmt: skip
 PEOPLE, PARTICLES = 4, 30
 SEEN = ("transition", "observant", "interruption")
-CONSTANT = ("epsilon", "learning_rate")
+CONSTANT = ("epsilon", "learning_rate", "actor_rate", "critic_rate")
+"""Schedules that do not change, in what is simulated and in what is fitted."""
+
 RANGES = {
     "q-learning": {"epsilon": (0.05, 0.4), "learning_rate": (0.05, 0.9)},
     "softmax-q-learning": {
@@ -183,12 +185,12 @@ def confusions() -> None:
         confusion(
             f"learners, {PEOPLE} participants of {episodes} episodes each",
             {name: of_kind(name, PEOPLE, episodes) for name in LEARNERS},
-            learners=LEARNERS, perceptions=["transition"],
+            learners=LEARNERS, perceptions=["transition"], free=CONSTANT,
         )  # fmt: skip
         confusion(
             f"perceptions of q-learning, {PEOPLE} participants of {episodes} episodes each",
             {seen: of_kind("q-learning", PEOPLE, episodes, seen) for seen in SEEN},
-            learners=["q-learning"], perceptions=SEEN,
+            learners=["q-learning"], perceptions=SEEN, free=CONSTANT[:2],
         )  # fmt: skip
 
 
@@ -198,7 +200,9 @@ def strangers() -> None:
     people = {str(trial): played(HABIT(), trial, 20) for trial in range(PEOPLE)}
     for models in (LEARNERS, (*LEARNERS, "habit")):
         title = f"{PEOPLE} participants of 20 episodes, {len(models)} models"
-        confusion(title, {"habit": people}, learners=models, perceptions=["transition"])
+        confusion(
+            title, {"habit": people}, learners=models, perceptions=["transition"], free=CONSTANT
+        )
 
 
 PARTS = {"recovery": recoveries, "confusion": confusions, "strangers": strangers}

@@ -113,3 +113,17 @@ def test_what_is_hidden_gives_the_likelihood_an_error():
 
 def test_the_same_search_gives_the_same_numbers():
     assert estimate(walking("q-learning")) == estimate(walking("q-learning"))
+
+
+def test_schedules_that_do_not_change_are_found():
+    """Bound: the truth lies on a ridge, and the maximum is above it."""
+    steps = walked("q-learning", trial=2, episodes=30)
+    candidate = make_candidate("q-learning", "transition")
+    likelihood = Likelihood(candidate, choices_of(steps, "participant"), Shape(48, 0, (0,) * 4), 30)
+    truth = make_candidate(
+        "q-learning", "transition", fixed={"epsilon": EPSILON, "learning_rate": RATE}
+    )
+    found = estimate(likelihood)
+    assert found.log_likelihood > likelihood.log_probabilities(truth.stack).sum()
+    assert found.parameters["learning_rate.start"] == pytest.approx(RATE, abs=0.05)
+    assert found.parameters["learning_rate.end"] == pytest.approx(RATE, abs=0.05)

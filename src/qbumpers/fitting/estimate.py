@@ -122,11 +122,32 @@ def _least(
     if not parameters:
         return np.zeros(0)
     low, high = np.transpose([parameter.ends() for parameter in parameters])
+    starts, tied = [np.asarray(default)], _tied(parameters)
+    if (tied != np.arange(len(tied))).any():
+        own, places = np.unique(tied, return_inverse=True)
+        fewer = [parameters[place] for place in own]
+        found = _least(
+            lambda point: loss(point[places]), fewer, [default[p] for p in own], generator
+        )
+        starts.append(found[places])
     drawn = generator.uniform(low, high, (_DRAWN_POINTS * len(parameters), len(parameters)))
     order = np.argsort([loss(point) for point in drawn], kind="stable")
-    starts = [np.asarray(default), *drawn[order[:_BEST_POINTS]]]
+    starts += [*drawn[order[:_BEST_POINTS]]]
     ends = [_descended(loss, start, low, high, _EVALUATIONS) for start in starts]
     return min(ends, key=loss)
+
+
+def _tied(parameters: Sequence[Parameter]) -> np.ndarray:
+    """Places of parameters, of ends of schedules those of their starts: int64 [K].
+
+    Schedules that do not change lie on a ridge that a search in all directions does not find.
+    """
+    names = [parameter.name for parameter in parameters]
+    starts = [name.removesuffix(".end") + ".start" for name in names]
+    return np.array([
+        names.index(start if name.endswith(".end") and start in names else name)
+        for name, start in zip(names, starts, strict=True)
+    ])  # fmt: skip
 
 
 def _descended(
