@@ -162,6 +162,18 @@ def inlined(function: F) -> F:
     return register_jitable(**INLINE)(function)
 
 
+def called(function: F) -> F:
+    """As `inlined`, for a piece that is called in several places, or is slow to compile twice.
+
+    Args:
+        function: a function in Numba's subset of Python.
+
+    Returns:
+        The same function.
+    """
+    return register_jitable(forceinline=False, **_SETTINGS)(function)
+
+
 def compiled_apart(function: F) -> F:
     """As `compiled`, for functions too large to be copied into each of their callers.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
-from qbumpers.compilation import INLINE, inlined, uncompiled
+from qbumpers.compilation import INLINE, called, inlined, uncompiled
 from qbumpers.errors import RequestError
 from qbumpers.learners.forgetting import Practice, fade, fade_by_age, grow_older
 from qbumpers.learners.interface import Shape, Transition
@@ -75,6 +75,13 @@ def learn(
     uncompiled(learner_for_settings(type(settings)).learn)(
         settings, memory, transition, rates, stream
     )
+
+
+def copy_memory(memory: Any, other: Any) -> None:
+    """Overwrite every array of a memory by that of another one of the same learner."""
+    for field, origin in zip(memory, other, strict=True):
+        if isinstance(field, np.ndarray):
+            field[:] = origin
 
 
 def forget(memory: Any, fresh: Any, share: float) -> None:
@@ -166,6 +173,19 @@ def _compiled_policy(settings: Any, memory: Any, state: Any, rates: Any, out: An
 @overload(learn, strict=False, jit_options=INLINE)
 def _compiled_learn(settings: Any, memory: Any, transition: Any, rates: Any, stream: Any) -> Any:
     return uncompiled(learner_for_settings(settings.instance_class).learn)
+
+
+@overload(copy_memory, strict=False, jit_options=INLINE)
+def _compiled_copy_memory(memory: Any, other: Any) -> Any:
+    places = [p for p, field in enumerate(memory.types) if isinstance(field, types.Array)]
+    copy_each = register_jitable(_for_each(places, _overwrite))
+    return lambda memory, other: copy_each(memory, other, 0)
+
+
+@called
+def _overwrite(field: np.ndarray, origin: np.ndarray, by: int) -> None:
+    for place in range(field.size):
+        field.flat[place] = origin.flat[place]
 
 
 @overload(forget, strict=False, jit_options=INLINE)

@@ -1,0 +1,53 @@
+"""`qbumpers fit` says which learner it is."""
+
+import polars as pl
+import pytest
+
+from qbumpers.experiments.steps import save_steps
+from tests.fitting.records import walked
+from tests.texts import words
+
+
+@pytest.fixture
+def steps(tmp_path):
+    path = tmp_path / "steps.parquet"
+    save_steps(path, {str(trial): walked("q-learning", trial=trial) for trial in range(3)})
+    return path
+
+
+def test_the_learner_that_made_the_choices_is_found(call, steps, tmp_path):
+    status, output, _ = call(
+        "fit", steps, "--learners", "q-learning,softmax-q-learning", "--perceptions", "transition",
+        "--participants", "2", "--free", "epsilon,learning_rate", "--fixed", "discount=1",
+        "--out", tmp_path / "tables",
+    )  # fmt: skip
+    assert status == 0
+    assert "2 participants" in output
+    assert "Estimates of q-learning, transition" in words(output)
+    assert "would take 5 participants" in words(output)
+    scores = pl.read_csv(tmp_path / "tables" / "scores.csv")
+    assert scores.height == 2 * 3
+    parameters = pl.read_csv(tmp_path / "tables" / "parameters.csv")
+    assert {"epsilon", "learning_rate"} <= set(parameters["parameter"])
+    assert pl.read_csv(tmp_path / "tables" / "models.csv")["model"][0] == "q-learning, transition"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--learners", "q-learnin"], "unknown learner 'q-learnin'"),
+        (["--fixed", "discount"], "fixed = 'discount'; names with numbers are needed"),
+        (["--free", "curiosity"], "parameter curiosity: none of the learners"),
+    ],
+)
+def test_a_wrong_request_is_one_line(call, steps, arguments, message):
+    status, _, error = call("fit", steps, *arguments)
+    assert status == 2
+    assert message in words(error)
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_file_that_is_not_there_is_one_line(call, tmp_path):
+    status, _, error = call("fit", tmp_path / "none.parquet")
+    assert status == 2
+    assert "not a readable Parquet file" in words(error)
