@@ -22,7 +22,7 @@ from qbumpers.comparison.results import NARROW
 from qbumpers.comparison.running import COMPARISON
 
 DATA = DOCS / "data" / "comparison"
-_DIGITS, _COLOURS = 4, 60
+_DIGITS, _COLOURS = 4, 160
 _NOTED = "comparison.json"
 
 
