@@ -61,6 +61,7 @@ def lunar_lander_display(seed: int | None = None) -> Display:
         width=_ACROSS, height=_UP, actions=ACTIONS, keys=_KEYS, rate=RATE, idle=0,
         backdrop=[*_sky(), *_ground(surface), *_pad()],
         scene=functools.partial(_scene, np.array(surface)),
+        words=_words,
     )  # fmt: skip
 
 
@@ -104,6 +105,20 @@ def _pad() -> list[Shape]:
         cloth = [(x, top - 50), (x, top - 38), (x + 25, top - 44)]
         shapes += [line([(x, top), (x, top - 51)], "#ffffff", 1.5), polygon(cloth, "#cccc00")]
     return shapes
+
+
+def _words(observation: Any) -> str:
+    """Where the lander is, how it moves and how it leans."""
+    x, y, across, down, angle = (float(number) for number in observation[:5])
+    place = "above the pad" if abs(x) < 0.2 else f"to the {'right' if x > 0 else 'left'} of the pad"
+    legs = int(observation[LEFT_LEG]) + int(observation[RIGHT_LEG])
+    touching = f"{legs} of 2 legs on the ground" if legs else f"height {max(y, 0):.1f}"
+    drift = "left" if across < 0 else "right"
+    lean = "right" if angle < 0 else "left"
+    return (
+        f"{touching}, {place}, {'falling' if down < 0 else 'rising'} at {abs(down):.1f}, drifting "
+        f"{drift} at {abs(across):.1f}, leaning {abs(math.degrees(angle)):.0f} degrees {lean}"
+    )
 
 
 def _scene(surface: np.ndarray, observation: Any, step: Step | None) -> list[Shape]:
