@@ -1,7 +1,7 @@
 """One participant's episodes at one task: a fold of what they proposed, without clock or socket."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,8 +189,8 @@ class Played(NamedTuple):
     steps: list[Step]
 
 
-def resumed(setup: Setup, seed: int, played: Iterable[Played]) -> Game:
-    """The game that a record leads to; in the open episode, everything is done again.
+def resumed(setup: Setup, seed: int, played: Sequence[Played]) -> Game:
+    """The game that a record leads to; in the last episode, everything is done again.
 
     Args:
         setup: what was played.
@@ -198,13 +198,12 @@ def resumed(setup: Setup, seed: int, played: Iterable[Played]) -> Game:
         played: its episodes, in their order.
 
     Raises:
-        RequestError: if a step of the open episode comes out differently than it was recorded.
+        RequestError: if a step of the last episode comes out differently than it was recorded.
     """
     game = Game(setup, seed)
-    for episode in played:
-        if episode.steps and int(episode.steps[-1].events) & ENDS:
-            game.recall(episode)
-            continue
+    for episode in played[:-1]:
+        game.recall(episode)
+    for episode in played[-1:]:
         game.begin(episode.choice)
         for recorded in episode.steps:
             difference = differing(game.propose(int(recorded.proposed)), recorded)

@@ -45,7 +45,7 @@ def play(
     """
     Game(setup, 0).begin(choice)
     path = folder / RECORDS
-    with contextlib.closing(_listening(port)) as listening:
+    with contextlib.closing(listening_at(port)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
         url = f"http://{address}/"
         sessions = Sessions(setup, choice, open_records(path))
@@ -53,10 +53,11 @@ def play(
         announce(url, path)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
-        uvicorn.Server(_configuration(make_application(sessions, hosts))).run([listening])
+        uvicorn.Server(configuration(make_application(sessions, hosts))).run([listening])
 
 
-def _configuration(application: object) -> uvicorn.Config:
+def configuration(application: object) -> uvicorn.Config:
+    """How uvicorn serves an application: one process, small messages, no compression."""
     return uvicorn.Config(
         application,  # pyright: ignore[reportArgumentType]
         ws="websockets-sansio",
@@ -73,7 +74,15 @@ def _configuration(application: object) -> uvicorn.Config:
     )
 
 
-def _listening(port: int) -> socket.socket:
+def listening_at(port: int) -> socket.socket:
+    """A socket of 127.0.0.1 that listens already.
+
+    Args:
+        port: any that is free if 0.
+
+    Raises:
+        RequestError: if it is in use, or there is no such port.
+    """
     listening = socket.socket()
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -70,6 +70,7 @@ def _last_view(game: Game) -> dict[str, Any] | None:
         "overridden": bool(step.overridden),
         "undone": bool(step.undone),
         "probability": float(step.probability),
+        "projected": float(step.projected_return),
         "reward": float(step.reward),
     }
 
