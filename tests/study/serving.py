@@ -86,14 +86,16 @@ class Page:
     """What a browser's page is to the server, without a browser."""
 
     def __init__(self, address, token="", hello=None):
-        self.socket = connect(f"ws://{address}/socket", origin=f"http://{address}")
-        self.send(type="hello", token=token, **(hello or {}))
+        self._connecting = connect(f"ws://{address}/socket", origin=f"http://{address}")
+        self._hello = {"token": token, **(hello or {})}
 
     def __enter__(self):
+        self.socket = self._connecting.__enter__()
+        self.send(type="hello", **self._hello)
         return self
 
-    def __exit__(self, *_):
-        self.socket.close()
+    def __exit__(self, *error):
+        self._connecting.__exit__(*error)
 
     def send(self, **message):
         self.socket.send(json.dumps(message))

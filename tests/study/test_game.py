@@ -9,6 +9,7 @@ from qbumpers.study.game import Choice, Game, Played, differing, resumed
 from qbumpers.study.setup import Setup
 from qbumpers.study.stepping import TabularStepper
 from qbumpers.tasks.dynamics import LIMIT, SUCCESS, TERMINATED
+from tests.narrowing import present
 from tests.study.serving import AROUND, DOWN, RIGHT, UP
 
 BUMPERS = Choice("stochastic-q-bumpers", {"alpha": 0.5})
@@ -111,13 +112,8 @@ def test_a_hidden_goal_is_hidden_from_the_assistant_only():
     setup = Setup("hidden-goal")
     game = Game(setup, seed=1)
     [step] = played(game, Choice("maximal", {}), [DOWN]).steps
-    assert step.next_state == int(present_seen(setup)[game.state])
+    assert step.next_state == int(present(setup.task.seen)[game.state])
     assert step.next_state != game.state
-
-
-def present_seen(setup):
-    assert setup.task.seen is not None
-    return setup.task.seen
 
 
 def test_chance_of_a_table_comes_out_as_often_as_it_should():

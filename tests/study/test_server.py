@@ -122,6 +122,7 @@ def test_a_page_that_comes_back_goes_on_in_mid_episode(address, records):
     with Page(address) as page:
         token = page.next()["token"]
         page.begin()
+        page.next("state")
         for number in range(4):
             page.act(number, UP)
     with Page(address, token) as page:
@@ -137,6 +138,7 @@ def test_a_second_page_takes_over_and_the_first_learns_why(address):
     with Page(address) as first:
         token = first.next()["token"]
         first.begin()
+        first.next("state")
         first.act(0, UP)
         with Page(address, token) as second:
             assert first.next()["reason"] == "this session goes on in another tab or window"
@@ -246,8 +248,8 @@ def test_a_task_in_real_time_goes_by_its_clock(lander, records):
     assert replay_file(records)[0].difference == ""
 
 
-def test_the_clock_stops_while_the_page_is_away(lander, records):
-    with served(lander, Choice("none", {}), records) as address:
+def test_the_clock_stops_while_the_page_is_away(records):
+    with served(Setup("mountain-car"), Choice("none", {}), records) as address:
         with Page(address) as page:
             token = page.next()["token"]
             page.begin()

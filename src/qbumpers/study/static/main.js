@@ -71,8 +71,8 @@ function welcome(message) {
   document.title = `${task.name} – Q Bumpers`;
   byId("clock").hidden = !realTime();
   byId("help").textContent = realTime()
-    ? "Hold a key, a button or a gamepad's direction. Leaving the page pauses the game."
-    : "Each key, button or gamepad's direction is a step. The game waits for you.";
+    ? "Hold a key, a button or a gamepad's direction. Keys count while the game has the focus; leaving the page pauses it."
+    : "Each key, button or gamepad's direction is a step. Keys count while the game has the focus; it waits for you.";
   board.show(task);
   input.show(task);
   panel.show(task);
