@@ -16,7 +16,10 @@ pytest.importorskip("starlette", reason="the extra study is not installed")
         (["cliff-walking", "stray"], "argument 'stray': an option of the assistant begins with --"),
         (["mountain-car"], "v_min = 0 must be below the value of the start state"),
         (["cliff-walking", "--port", "99999"], "port = 99999"),
-        (["cliff-walking", "--assistant", "trajectory-bumpers", "--path=a.csv", "--reach=1"], "input should be a valid tuple"),
+        (
+            ["cliff-walking", "--assistant", "trajectory-bumpers", "--path=a.csv", "--reach=1"],
+            "input should be a valid tuple",
+        ),
     ],
 )
 def test_a_wrong_request_is_refused_in_one_line(call, tmp_path, arguments, message):

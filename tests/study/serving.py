@@ -9,6 +9,7 @@ import sys
 import threading
 
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from tests.narrowing import present
 
@@ -86,7 +87,7 @@ class Page:
     """What a browser's page is to the server, without a browser."""
 
     def __init__(self, address, token="", hello=None):
-        self._connecting = connect(f"ws://{address}/socket", origin=f"http://{address}")
+        self._connecting = connect(f"ws://{address}/socket", origin=Origin(f"http://{address}"))
         self._hello = {"token": token, **(hello or {})}
 
     def __enter__(self):
@@ -126,4 +127,3 @@ class Page:
 UP, RIGHT, DOWN, LEFT = range(4)
 AROUND = [UP, *[RIGHT] * 11, DOWN]
 """The shortest way around the cliff: 13 steps of -1 each, and 100 at the goal."""
-

@@ -73,9 +73,7 @@ def test_steps_are_read_as_they_were(writing, name, request):
     assert (found.seed, found.setup) == (2**62, setup.description)
     assert found.played[0].choice == Choice("maximal", {})
     assert len(found.played[0].steps) == len(steps)
-    assert all(
-        differing(*pair) == "" for pair in zip(found.played[0].steps, steps, strict=True)
-    )
+    assert all(differing(*pair) == "" for pair in zip(found.played[0].steps, steps, strict=True))
     assert sessions_in(open_records(path)) == ["s"]
     assert read_session(open_records(path), "t") is None
 

@@ -30,7 +30,7 @@ let held = { action: null, device: "keyboard", pressed: null };
 let sequence = 0;
 let paused = false;
 let share = 1;
-let worded = 0;
+let worded = -Infinity; // when the state was last put into words
 let refresh = 0;
 let fade = 0;
 let go = () => {};
@@ -87,7 +87,10 @@ function welcome(message) {
 
 function show(message) {
   const beginning = state === null || message.episode.episode !== state.episode.episode;
-  if (beginning) panel.clear();
+  if (beginning) {
+    panel.clear();
+    worded = -Infinity;
+  }
   state = message;
   waiting = false;
   episodes[message.episode.episode] = message.episode;
