@@ -26,6 +26,7 @@ FLAGS = [
 WIDTHS = {"desktop": 1280, "phone": 390}
 KEYS = ["ArrowUp", *["KeyD"] * 11, "ArrowDown"]
 """Around the cliff."""
+MINUS_13 = "\N{MINUS SIGN}13"
 SINCE = "step => Number(document.getElementById('step').textContent) >= step"
 ALONE = Choice("stochastic-q-bumpers", {"alpha": 0.5}, assisted=False)
 
@@ -43,7 +44,19 @@ def browser():
 
 
 @pytest.fixture
-def opened(browser):
+def opened(pages):
+    """Opens a page in a browser of its own."""
+    return pages[0]
+
+
+@pytest.fixture
+def open_in(pages):
+    """Opens one more page in the browser of another."""
+    return pages[1]
+
+
+@pytest.fixture
+def pages(browser):
     """Opens pages; whatever goes wrong in one is an error of the test."""
     wrong, contexts = [], []
 
@@ -56,9 +69,9 @@ def opened(browser):
         contexts.append(context)
         if before:
             context.add_init_script(before)
-        return watched(context, address)
+        return open_in(context, address)
 
-    def watched(context, address):
+    def open_in(context, address):
         page = context.new_page()
         page.set_default_timeout(15_000)
         page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -67,8 +80,7 @@ def opened(browser):
         page.wait_for_selector("#task:not(:empty)")
         return page
 
-    open_page.watched = watched
-    yield open_page
+    yield open_page, open_in
     for context in contexts:
         context.close()
     # A server that is gone is what some tests are about.
@@ -175,7 +187,12 @@ def test_what_the_assistant_sees_and_does_is_shown(cliff_server, opened):
     begin(page)
     sees = page.inner_text("#view").split()
     assert sees[sees.index("up") : sees.index("up") + 4] == ["up", "87", "87", "0"]
-    assert sees[sees.index("right") : sees.index("right") + 4] == ["right", "−13", "−13", "100"]
+    assert sees[sees.index("right") : sees.index("right") + 4] == [
+        "right",
+        MINUS_13,
+        MINUS_13,
+        "100",
+    ]
     assert "up" in page.inner_text("#view .best")
     walk(page, ["ArrowRight"])
     page.wait_for_selector("#override:visible")
@@ -318,11 +335,11 @@ def test_the_page_survives_a_killed_server(tmp_path, opened):
     assert [len(episode.steps) for episode in played(out / "play.sqlite")] == [13]
 
 
-def test_a_second_tab_takes_over_and_the_first_says_so(cliff_server, opened):
+def test_a_second_tab_takes_over_and_the_first_says_so(cliff_server, opened, open_in):
     first = opened(cliff_server)
     begin(first)
     walk(first, KEYS[:3])
-    second = opened.watched(first.context, cliff_server)
+    second = open_in(first.context, cliff_server)
     expect_step(second, 3)
     first.wait_for_selector("#go:visible")
     assert first.inner_text("#headline") == "Played elsewhere"

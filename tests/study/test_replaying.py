@@ -1,5 +1,6 @@
 """A record is decided again, and says the first thing that comes out differently."""
 
+import json
 import re
 import sqlite3
 
@@ -26,9 +27,9 @@ def record(cliff, tmp_path):
         (Choice("stochastic-q-bumpers", {"alpha": 0.5}), 8),
     ]):  # fmt: skip
         game.begin(choice)
-        writer.add([(EPISODES, {"session": "one", "episode": episode, "began": 0.0,
-                                "assistant": choice.name, "assisted": True,
-                                "options": '{"alpha": 0.5}' if choice.options else "{}"})])  # fmt: skip
+        about = {"assistant": choice.name, "options": json.dumps(choice.options)}
+        row = {"session": "one", "episode": episode, "began": 0.0, "assisted": True, **about}
+        writer.add([(EPISODES, row)])
         for k in range(most):
             if not game.playing:
                 break
