@@ -55,7 +55,8 @@ def test_help_names_every_command_and_what_it_does(call, flag):
         (
             "play",
             ["TASK", "--assistant NAME", "--alpha SHARE", "--port N", "default: 8765",
-             "--no-browser", "--out DIR", "default: results/play", "Example: qbumpers play lunar-lander"],
+             "--no-browser", "--out DIR", "default: results/play",
+             "Example: qbumpers play lunar-lander"],
         ),
         ("report", ["DIR", "Results of a finished run"]),
         ("list", ["assistants|tasks|learners", "What to list"]),
