@@ -37,7 +37,7 @@ class Writer:
         """Add rows.
 
         Args:
-            rows: in the order in which they are added.
+            rows: those of a table are added in their order.
             lasting: whether they must also survive a power cut; without it, they survive the end
                 of the server however it comes.
 
@@ -82,9 +82,8 @@ class Writer:
         try:
             _set_synchronous(connection, "FULL" if lasting else "NORMAL")
             with connection.begin():
-                for addition in group:
-                    for table, row in addition.rows:
-                        connection.execute(table.insert(), row)
+                for table, rows in _by_table(group).items():
+                    connection.execute(table.insert(), rows)  # many rows at once take less time
         except Exception as error:  # whatever it is, those who wait must hear of it
             if last:
                 group[0].done.set_exception(error)
@@ -92,6 +91,14 @@ class Writer:
         for addition in group:
             addition.done.set_result(None)
         return True
+
+
+def _by_table(group: Sequence[_Addition]) -> dict[sql.Table, list[Mapping[str, Any]]]:
+    found: dict[sql.Table, list[Mapping[str, Any]]] = {}
+    for addition in group:
+        for table, row in addition.rows:
+            found.setdefault(table, []).append(row)
+    return found
 
 
 def _set_synchronous(connection: sql.Connection, how: str) -> None:
