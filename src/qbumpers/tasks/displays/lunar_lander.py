@@ -34,7 +34,8 @@ _KEYS = {
     "ArrowDown": 0, "KeyS": 0,
 }  # fmt: skip
 _ACROSS, _UP = WIDTH * SCALE, HEIGHT * SCALE  # 600 x 400
-_LEG_ANGLES = np.linspace(0.348, 0.9, 13)  # to the hull, radians: held by its motor, to its limit
+# To the hull, radians: held by its motor, to its limit.
+_LEG_ANGLES = np.linspace(0.348, 0.9, 13).tolist()
 _EDGE = "#4d4d80"
 _STARS = 70
 
@@ -174,9 +175,11 @@ def _leg(surface: np.ndarray, placed: Placed, side: int, touches: bool) -> list[
 def _spread(surface: np.ndarray, placed: Placed, side: int) -> float:
     """The angle of a leg to the hull, radians: the smallest that keeps its end above the ground."""
     end = 0, -LEG_HALF_HEIGHT * SCALE
-    ends = np.array(placed(_beside_leg(side, angle, end) for angle in _LEG_ANGLES))
-    above = ends[:, 1] <= np.interp(ends[:, 0], surface[:, 0], surface[:, 1])
-    return _LEG_ANGLES[np.argmax(above) if above.any() else -1]
+    for angle in _LEG_ANGLES:  # mostly it is the first one
+        [(x, y)] = placed([_beside_leg(side, angle, end)])
+        if y <= np.interp(x, surface[:, 0], surface[:, 1]):
+            return angle
+    return _LEG_ANGLES[-1]
 
 
 def _beside_leg(side: int, angle: float, point: Point) -> tuple[float, float]:
