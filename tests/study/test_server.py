@@ -2,15 +2,19 @@
 
 import contextlib
 import json
+import sqlite3
 import time
 import urllib.error
 import urllib.request
+from typing import NamedTuple
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from qbumpers import register_assistant
+from qbumpers.decisions import Decision
 from qbumpers.study import connection
 from qbumpers.study.game import Choice
 from qbumpers.study.replaying import replay_file
@@ -278,6 +282,54 @@ def test_half_speed_is_half_as_fast(lander, records):
         for _ in range(15):
             page.next("state")
         assert 15 / 25 * 0.9 < time.monotonic() - began < 3
+
+
+class NoOptions(NamedTuple):
+    pass
+
+
+def test_an_assistant_that_fails_loses_only_the_step(address, records):
+    @register_assistant("fails-at-right", NoOptions)
+    def fails_at_right(situation, noise, options):
+        return Decision(9 if situation.proposed == 1 else situation.proposed, 0.0)
+
+    with Page(address) as page:
+        token = page.next()["token"]
+        page.begin(assistant="fails-at-right")
+        page.next("state")
+        page.act(0, UP)
+        page.press(1, RIGHT)
+        code, reason = closing(page)
+    assert code == connection.FAILED
+    assert "assistant fails-at-right: Decision(action=9" in reason
+    with Page(address, token) as page:
+        assert page.next("state")["number"] == 1
+        assert page.act(1, UP)["number"] == 2
+    assert len(recorded(records)[0].played[0].steps) == 2
+
+
+def test_what_cannot_be_written_is_not_shown(address, records):
+    with Page(address) as page:
+        token = page.next()["token"]
+        page.begin()
+        page.next("state")
+        page.act(0, UP)
+        raw = sqlite3.connect(records)
+        raw.execute(
+            "create trigger full before insert on steps begin select raise(abort, 'disk full'); end"
+        )
+        raw.commit()
+        page.press(1, UP)
+        code, reason = closing(page)
+        assert code == connection.NOT_KEPT
+        assert "the record cannot be written: IntegrityError" in reason
+        assert "disk full" in reason
+    raw.execute("drop trigger full")
+    raw.commit()
+    raw.close()
+    with Page(address, token) as page:
+        assert page.next("state")["number"] == 1
+        assert page.act(1, UP)["number"] == 2
 
 
 def test_a_killed_server_loses_nothing_and_doubles_nothing(tmp_path):

@@ -9,9 +9,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from qbumpers.errors import RequestError
 from qbumpers.study.messages import Message, decoded, encoded
 
-TAKEN_OVER, TOO_MUCH, WRONG, UNKNOWN_SESSION, NOT_KEPT = 4001, 4002, 4003, 4004, 4005
+TAKEN_OVER, TOO_MUCH, WRONG, UNKNOWN_SESSION, NOT_KEPT, FAILED = range(4001, 4007)
 """Codes with which a socket is closed: another page took over; too many or too long messages; no
-proper greeting; a session that cannot be gone on with; what happened could not be written."""
+proper greeting; a session that cannot be gone on with; what happened could not be written; the task
+or the assistant failed."""
 
 MESSAGES_PER_SECOND = 100.0
 """That a page may send for long; keys repeat about 30 times per second."""

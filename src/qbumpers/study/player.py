@@ -1,13 +1,14 @@
 """One participant's session: what their page says, the clock, and what is written down."""
 
 import asyncio
+import contextlib
 import json
 import time
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from qbumpers.errors import RequestError, action_number
-from qbumpers.study.connection import NOT_KEPT, TAKEN_OVER, Connection, GoneError
+from qbumpers.study.connection import FAILED, NOT_KEPT, TAKEN_OVER, Connection, GoneError
 from qbumpers.study.game import Choice, Game
 from qbumpers.study.messages import (
     Act,
@@ -63,7 +64,7 @@ class Player:
     Attributes:
         session: identifier.
         connection: the page; None while it is away.
-        lost: whether something could not be written, so that the record alone knows the state.
+        lost: whether the game went wrong, so that the record alone knows the state.
     """
 
     def __init__(self, session: str, game: Game, writer: Writer, second: float = 1.0) -> None:
@@ -195,7 +196,11 @@ class Player:
         """One step, written down and shown; `_stepping` is held."""
         game = self._game
         action_number(proposal.action, "action", 0, game.setup.task.actions)
-        step = game.propose(proposal.action)
+        try:
+            step = game.propose(proposal.action)
+        except RequestError as error:
+            await self._give_up(FAILED, str(error))
+            raise GoneError from error
         over = not game.playing
         row = {
             **step_row(self.session, game.number - 1, game.episodes[-1].number, step),
@@ -212,12 +217,16 @@ class Player:
         try:
             await asyncio.wrap_future(self._writer.add([row], lasting=lasting))
         except Exception as error:
-            self.lost = True  # the game is ahead of the record
-            self._stop_clock()
-            if self.connection is not None:
-                reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-                await self.connection.close(NOT_KEPT, f"the record cannot be written: {reason}")
+            reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+            await self._give_up(NOT_KEPT, f"the record cannot be written: {reason}")
             raise GoneError from error
+
+    async def _give_up(self, code: int, reason: str) -> None:
+        """Leave a game that is ahead of its record; who comes back gets the recorded one."""
+        self.lost = True
+        self._stop_clock()
+        if self.connection is not None:
+            await self.connection.close(code, reason)
 
     async def _note(self, kind: str, content: Mapping[str, Any]) -> None:
         row = {"session": self.session, "time": time.time(), "kind": kind}
@@ -259,12 +268,22 @@ class Player:
             self._clock = asyncio.create_task(self._run_clock(self._ticking))
 
     async def _run_clock(self, number: int) -> None:
-        """Count down, then step at the task's rate until another clock has started or none may."""
+        """Count down and go, until another clock has started, none may, or the page has gone."""
+        with contextlib.suppress(GoneError):
+            if await self._counted_down(number):
+                await self._go(number)
+
+    async def _counted_down(self, number: int) -> bool:
+        """Whether this clock may still go after its countdown."""
         for seconds in range(COUNTDOWN, 0, -1):
             await self._send("countdown", seconds=seconds)
             await asyncio.sleep(self._second)
             if self._ticking != number:
-                return
+                return False
+        return True
+
+    async def _go(self, number: int) -> None:
+        """Step at the task's rate."""
         await self._send("running")
         self._heard = time.monotonic()
         due = time.monotonic()
@@ -274,10 +293,7 @@ class Player:
             async with self._stepping:
                 if self._ticking != number:
                     return
-                try:
-                    await self._step(self._proposed_now())
-                except GoneError:
-                    return
+                await self._step(self._proposed_now())
             if time.monotonic() - self._heard > AWAY:
                 await self._pause("the page has not been heard of")
 

@@ -105,6 +105,7 @@ def open_records(path: str | Path) -> sql.Engine:
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch(mode=0o600)  # it holds what tokens are signed with
     engine = sql.create_engine(f"sqlite:///{path}")
     event.listen(engine, "connect", _prepare)
     event.listen(engine, "begin", _begin)
@@ -114,7 +115,6 @@ def open_records(path: str | Path) -> sql.Engine:
             _check_version(connection, path)
     except DatabaseError as error:
         raise RequestError(f"records file {path}: {error.orig}") from error
-    path.chmod(0o600)  # it holds what tokens are signed with
     return engine
 
 

@@ -1,7 +1,7 @@
 // The socket: says hello, comes back after it was lost, and remembers which session this is.
 
 const KEY = "qbumpers-session";
-const TAKEN_OVER = 4001, UNKNOWN_SESSION = 4004, REFUSED = [4002, 4003, 4005];
+const TAKEN_OVER = 4001, UNKNOWN_SESSION = 4004, REFUSED = [4002, 4003, 4005, 4006];
 
 export class Link {
   #socket = null;
