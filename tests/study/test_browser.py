@@ -384,12 +384,13 @@ def delayed(address, seconds):
         yield f"127.0.0.1:{listening.getsockname()[1]}"
 
 
-def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened):
+@pytest.mark.parametrize("round_trip", [0.1, 0.2])
+def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened, round_trip):
     from qbumpers.study import running, server, tables
 
     listening = running.listening_at(0)
     near = f"127.0.0.1:{listening.getsockname()[1]}"
-    with contextlib.closing(listening), delayed(near, 0.05) as far:
+    with contextlib.closing(listening), delayed(near, round_trip / 2) as far:
         import uvicorn
 
         sessions = server.Sessions(cliff, ALONE, tables.open_records(records))
@@ -401,12 +402,12 @@ def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened)
         try:
             page = opened(far)
             begin(page)
-            for key in KEYS[:3]:  # faster than answers come, which take 100 ms
+            for key in KEYS[:3]:  # faster than answers come
                 page.keyboard.press(key)
             expect_step(page, 3)
             began = time.monotonic()
             walk(page, KEYS[3:])
-            assert time.monotonic() - began < 10 * 0.5
+            assert time.monotonic() - began < 10 * (round_trip + 0.4)
             page.wait_for_selector("#go:visible")
             assert page.inner_text("#return") == "87"
             page.context.close()

@@ -1,11 +1,14 @@
 """What a page may say, and what it hears of what it may not."""
 
+import contextlib
 import json
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from qbumpers.errors import RequestError
-from qbumpers.study.messages import MOST_BYTES, Act, Begin, Hold, decoded, encoded
+from qbumpers.study.messages import MOST_BYTES, Act, Begin, Hold, Message, decoded, encoded
 
 ACT = {"type": "act", "number": 3, "action": 1, "device": "touch", "pressed": 5.0, "shown": 4.0}
 
@@ -40,6 +43,30 @@ def test_a_message_is_what_it_says():
 def test_a_wrong_message_is_refused_by_what_is_wrong(text, message):
     with pytest.raises(RequestError, match=f"(?i){message}"):
         decoded(text)
+
+
+@given(st.text() | st.binary())
+def test_whatever_comes_is_a_message_or_refused(text):
+    with contextlib.suppress(RequestError):
+        assert isinstance(decoded(text), Message)
+
+
+VALUES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+TYPES = st.sampled_from(["hello", "begin", "act", "hold", "pause", "continue", "speed", "focus"])
+FIELDS = st.sampled_from([
+    "episode", "assistant", "options", "number", "action", "device", "pressed", "shown", "sequence",
+    "share", "focused", "at", "token",
+])  # fmt: skip
+
+
+@given(TYPES, st.dictionaries(FIELDS, VALUES))
+def test_fields_of_any_kind_are_a_message_or_refused(kind, fields):
+    with contextlib.suppress(RequestError):
+        found = decoded(json.dumps({"type": kind, **fields}))
+        assert isinstance(found, Message)
+        if isinstance(found, Act):
+            assert found.action >= 0
+            assert 0 <= found.number < 2**60
 
 
 def test_a_long_message_is_not_read():
