@@ -16,6 +16,7 @@ import plain_python
 from measuring import Row, Target, Timed, alternate, compared, is_quick, seconds_of, show
 
 from qbumpers.assistants import Assistant, make_assistant
+from qbumpers.learners import make_learner
 from qbumpers.simulation import Condition, make_condition, run
 from qbumpers.tasks import cliff_walking
 
@@ -25,6 +26,7 @@ ASSISTANTS = {
     "local-q-thresholding": make_assistant("local-q-thresholding", alpha=0.0195, second=True),
     "stochastic-q-bumpers": make_assistant("stochastic-q-bumpers", alpha=0.7, second=True),
 }
+LEARNERS = tuple(name for name in cliff_walking().learners if name != "q-learning")
 FLOOR = Target(30, at_least=True)
 UNIT = "M steps/s"
 
@@ -92,9 +94,9 @@ class Loops:
                 )
 
 
-def condition_of(assistant: Assistant) -> Condition:
-    """The assistant at Cliff Walking, its loop compiled."""
-    condition = make_condition(cliff_walking(), assistant)
+def condition_of(assistant: Assistant, learner: str = "q-learning") -> Condition:
+    """The assistant and a learner at Cliff Walking, their loop compiled."""
+    condition = make_condition(cliff_walking(), assistant, learner=make_learner(learner))
     run(condition, trials=1)
     return condition
 
@@ -137,6 +139,22 @@ def by_assistant(rounds: int) -> list[Row]:
     ]
 
 
+def by_learner(rounds: int) -> list[Row]:
+    """Each learner's rate, in proportion to that of Q-learning with the same assistant."""
+    rows = []
+    for name in ("none", "stochastic-q-bumpers"):
+        learners = {
+            learner: _rate(condition_of(ASSISTANTS[name], learner))
+            for learner in ("q-learning", *LEARNERS)
+        }
+        rates = alternate(learners, rounds)
+        rows += [
+            compared(f"{learner}, {name}", rates[learner], UNIT, "q-learning", rates["q-learning"])
+            for learner in LEARNERS
+        ]
+    return rows
+
+
 def _rate(condition: Condition) -> Timed:
     def timed(seed: int) -> float:
         begin = time.process_time()
@@ -167,7 +185,12 @@ def two_workers(rounds: int) -> Row:
 def measure(quick: bool) -> list[Row]:
     """Every row of this benchmark."""
     rounds = 2 if quick else 9
-    return [*against_plain_loops(rounds), *by_assistant(rounds), two_workers(rounds)]
+    return [
+        *against_plain_loops(rounds),
+        *by_assistant(rounds),
+        *by_learner(rounds),
+        two_workers(rounds),
+    ]
 
 
 if __name__ == "__main__":

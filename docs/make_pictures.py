@@ -62,19 +62,19 @@ def credit_picture() -> Figure:
     with figure(9, 2.45) as drawing:
         happened, remembered = drawing.subplots(1, 2)
         for axes in (happened, remembered):
-            _draw_corner(axes)
-        _draw_arrow(happened, (0, 0.95), OWN, "dashed")
-        _draw_arrow(happened, (0.9, 0), DONE, "solid")
+            draw_corner(axes)
+        draw_arrow(happened, (0, 0.95), OWN, "dashed")
+        draw_arrow(happened, (0.9, 0), DONE, "solid")
         happened.set_title("What happened")
         happened.set_xlabel("chose down (dashed); the assistant executed right")
-        _draw_arrow(remembered, (0, 0.95), OWN, "solid")
+        draw_arrow(remembered, (0, 0.95), OWN, "solid")
         remembered.plot(3.5, 0.5, "o", markersize=24, fillstyle="none", color=OWN, mew=2.6)
         remembered.set_title("What a transition learner remembers")
         remembered.set_xlabel("down: lost 1, and came to the ringed cell")
     return drawing
 
 
-def _draw_corner(axes: Axes) -> None:
+def draw_corner(axes: Axes) -> None:
     """Five columns of the two lower rows, the walker in the middle."""
     corner = walker_picture()[2 * CELL :, 4 * CELL : 9 * CELL]
     axes.imshow(corner, extent=(0, 5, 2, 0))
@@ -83,7 +83,7 @@ def _draw_corner(axes: Axes) -> None:
     axes.spines[:].set_visible(False)
 
 
-def _draw_arrow(axes: Axes, move: tuple[float, float], ink: str, line: str) -> None:
+def draw_arrow(axes: Axes, move: tuple[float, float], ink: str, line: str) -> None:
     """An arrow from the walker, outlined in white to be seen on the cliff."""
     arrow = FancyArrowPatch(
         (2.5, 0.5), (2.5 + move[0], 0.5 + move[1]), shrinkA=0, shrinkB=0, arrowstyle="-|>",

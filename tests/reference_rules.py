@@ -441,6 +441,13 @@ WITH_MEMORY: dict[str, Any] = {
 
 def plain_rule(name, task=None, **options):
     """The plain form of an assistant, as a file would describe it; some know the task."""
+    # Not above: that module takes from this one what the rules have in common.
+    from tests import reference_learner_aware as aware
+
+    if name == "learner-aware-bumpers":
+        return aware.PlainLearnerAware(**options, task=task)
+    if name == "model-free-learner-aware-bumpers":
+        return aware.PlainModelFreeLearnerAware(**options, task=task)
     if name not in WITH_MEMORY:
         return PlainRule(name, **options)
     kind = WITH_MEMORY[name]

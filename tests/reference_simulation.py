@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from qbumpers.decisions import Noise, Situation
+from qbumpers.learners import PowerLaw
+from tests.learners.textbook_tables import LEARNERS, Table
 from tests.reference_rules import one_of
 
 
@@ -118,9 +120,11 @@ class ReferenceTrial:
         self.seed, self.trial = seed, trial
         self.draw_from(seeded_bit_generators(seed, condition.learning(), trial))
         self.perception = perceived(condition.perception, condition.penalty)
-        self.own_values = [
-            [float(self.learner.initial_value)] * self.task.actions for _ in range(self.task.states)
-        ]
+        first = float(getattr(self.learner, "initial_value", 0.0))
+        self.own_values = [[first] * self.task.actions for _ in range(self.task.states)]
+        kind = LEARNERS.get(type(self.learner).__name__)
+        self.other = kind and kind(self.learner, self.task.states, self.task.actions)
+        self.practised = {}  # (state, action): number of the episode of its last practice
         self.ahead = None  # (state, action) that a learner of SARSA has chosen already
         self.episodes, self.steps = [], []
         self.counts = {
@@ -138,7 +142,7 @@ class ReferenceTrial:
                 common = {"common_random_numbers": True}
                 self.draw_from(bit_generators_of_episode(self.seed, common, self.trial, episode))
             if episode > 0:
-                self.forget(self.condition.forgetting)
+                self.forget(self.condition.forgetting, episode)
             is_assisted = episode < self.condition.episodes
             assisted = self.training_episode(episode, is_assisted)
             unassisted = self.greedy_episode(is_assisted)
@@ -148,11 +152,32 @@ class ReferenceTrial:
             )
         return self
 
-    def forget(self, share):
-        if share == 0:
+    def remembered(self):
+        """Everything that can be forgotten, as (dictionary by (state, action, ...), its origin)."""
+        if self.other:
+            return self.other.remembered()
+        return [(Table(self.own_values), self.learner.initial_value)]
+
+    def forget(self, forgetting, episode):
+        """Before an episode: a share of what there is, or what a power law of its age asks for."""
+        if forgetting == 0:
             return
-        for own in self.own_values:
-            own[:] = [value + share * (self.learner.initial_value - value) for value in own]
+        for table, origin in self.remembered():
+            for place, value in list(table.items()):
+                aged = isinstance(forgetting, PowerLaw)
+                share = self.lost(place, episode) if aged else forgetting
+                table[place] = value + share * (origin - value)
+
+    def lost(self, place, episode):
+        """Share of what was left in the last episode that is gone by this one.
+
+        What was never practised is as old as the trial.
+        """
+        pairs = [place[:2]] if len(place) > 1 else [(*place, a) for a in range(self.task.actions)]
+        last = max(self.practised.get(pair, 0) for pair in pairs)
+        decay = self.condition.forgetting.decay
+        before, now = ((1 + t) ** -decay for t in (episode - 1 - last, episode - last))
+        return 1 - now / before
 
     def first_state(self, generator):
         starts = np.flatnonzero(self.task.start)
@@ -178,7 +203,7 @@ class ReferenceTrial:
         action = None
         while length < self.task.episode_limit and not ended:
             self.counts["unassisted"][state] += counted
-            own = self.own_values[state]
+            own = self.wanted(state)
             action = self.hand(one_of(own, max(own), self.greedy.random()), action, self.greedy)
             state, reward, ended, happened = self.outcome(state, action, self.greedy)
             total, length, events = total + reward, length + 1, events | happened
@@ -203,8 +228,13 @@ class ReferenceTrial:
             return int(tie * len(own))
         return one_of(own, max(own), tie)
 
+    def wanted(self, state):
+        return self.other.wanted(state) if self.other else self.own_values[state]
+
     def mean(self, state, epsilon):
         """What the action is chosen for."""
+        if self.other:
+            return self.other.choose(state, self.explore)
         if self.ahead is not None and self.ahead[0] == state:
             return self.ahead[1]
         return self.explored(state, epsilon)
@@ -215,9 +245,19 @@ class ReferenceTrial:
             return situation.proposed, 0.0, False
         return (*self.rule(situation, noise), False)[:3]
 
+    def rates(self, episode):
+        """Exploration and step size; other learners look for theirs themselves."""
+
+        def rate_of(schedule):
+            return scheduled(schedule, episode, self.condition.episodes)
+
+        if self.other:
+            self.other.begin(rate_of)
+            return None, None
+        return rate_of(self.learner.epsilon), rate_of(self.learner.learning_rate)
+
     def training_episode(self, episode, is_assisted):
-        epsilon = scheduled(self.learner.epsilon, episode, self.condition.episodes)
-        rate = scheduled(self.learner.learning_rate, episode, self.condition.episodes)
+        epsilon, rate = self.rates(episode)
         state, self.ahead = self.first_state(self.nature), None
         start_value = max(self.condition.values[state].tolist())
         earned, discount, first_step = 0.0, 1.0, len(self.steps)
@@ -241,6 +281,7 @@ class ReferenceTrial:
             credited = self.learn(
                 state, proposed, executed, undone, reward, next_state, would_end, epsilon, rate
             )
+            self.practised[state, credited] = episode
             step = SimpleNamespace(
                 episode=episode, state=state, next_state=next_state, events=happened,
                 proposed=proposed, executed=executed, undone=undone, credited=credited,
@@ -282,6 +323,10 @@ class ReferenceTrial:
         if learned is None:
             return -1
         action, believed_reward, back = learned
+        if self.other:
+            led_to, ends = (state, False) if back else (next_state, would_end)
+            self.other.learn(state, action, believed_reward, led_to, ends)
+            return action
         future = 0.0
         if back or not would_end:
             led_to = state if back else next_state

@@ -86,7 +86,7 @@ def test_all_benchmarks_are_run_by_one_script():
 @pytest.mark.parametrize(
     ("script", "names"),
     [
-        ("simulation.py", ["one core", "none", "maximal", "two workers"]),
+        ("simulation.py", ["one core", "none", "maximal", "model-based, none", "two workers"]),
         ("shared_control.py", ["none", "maximal", "local-q-thresholding", "stochastic-q-bumpers"]),
         ("lander.py", ["random actions", "landing", "reset"]),
         ("deep.py", ["training step", "faster than plain PyTorch", "SB3", "two processes"]),

@@ -86,8 +86,9 @@ def test_assistants_are_listed_unless_something_else_is_asked_for(call):
 def test_tasks_are_listed_by_the_names_that_experiments_use(call):
     status, output, _ = call("list", "tasks")
     assert status == 0
-    for name in ("cliff-walking", "FrozenLake-v1", "Taxi-v4"):
+    for name in ("cliff-walking", "random-mdp", "FrozenLake-v1", "Taxi-v4"):
         assert any(line.startswith(f"{name} ") for line in output.splitlines())
+    assert "Drive a weak car up a hill" in output
 
 
 WRONG_COMMANDS = {

@@ -20,12 +20,14 @@ from qbumpers.learners import (
     PERCEPTIONS,
     Motor,
     Perception,
+    PowerLaw,
     learners,
     make_learner,
     register_learner,
 )
 from qbumpers.learners import q_learning as q
 from qbumpers.tasks import cliff_walking
+from qbumpers.tasks.remapping import remapped
 from tests.assistants.examples import EXAMPLES
 
 TABLES = (slippery_corridor(), cliff_walking())
@@ -76,8 +78,9 @@ def test_a_perception_is_the_same_in_every_host(perception):
 
 def test_layers_around_a_learner_are_the_same_in_every_host():
     assistant = make_assistant("maximal")
-    layers = {"motor": Motor(slip=0.2, lag=0.3), "forgetting": 0.1}
-    assert check_conformance(assistant, tasks=TABLES, **layers)
+    for forgetting in (0.1, PowerLaw()):
+        layers = {"motor": Motor(slip=0.2, lag=0.3), "forgetting": forgetting}
+        assert check_conformance(assistant, tasks=TABLES, **layers)
 
 
 @pytest.mark.slow
@@ -87,6 +90,14 @@ def test_every_pair_does_the_same_in_every_host(name, rule):
     assistant = make_assistant(rule, **EXAMPLES[rule])
     tables = [task for task in small_tasks(assistant) if task.states]
     assert check_conformance(assistant, tasks=tables, learner=make_learner(name))
+
+
+@pytest.mark.parametrize("name", ["stochastic-q-bumpers", "undo"])
+def test_a_rule_does_the_same_in_every_host_if_keys_are_exchanged(name):
+    task = remapped(slippery_corridor(), (1, 3, 0, 2))
+    found = check_conformance(make_assistant(name, **EXAMPLES[name]), tasks=[task])
+    assert {each.host for each in found} == HOSTS
+    assert all(0 < each.overridden < each.steps for each in found)
 
 
 @pytest.mark.slow

@@ -316,6 +316,31 @@ def test_the_reproduction_page_says_what_its_script_finds(tmp_path):
     assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
 
 
+def test_the_page_on_learner_aware_bumpers_says_what_was_measured(tmp_path):
+    assert make("make_learner_aware.py", tmp_path) == {"learner-aware.png"}
+    fresh = (tmp_path / "learner-aware.md").read_text(encoding="utf-8")
+    assert (DOCS / "learner-aware.md").read_text(encoding="utf-8") == fresh
+
+
+@pytest.mark.slow
+def test_learner_aware_bumpers_can_be_measured_again():
+    command = [sys.executable, str(DOCS / "run_learner_aware.py"), "points", "robust"]
+    printed = subprocess.run(
+        [*command, "--trials", "2"], capture_output=True, text=True, check=True
+    ).stdout
+    assert len(re.findall(r"assisted and more than .*: (?:reached|missed)", printed)) == 3
+    assert "estimated values" in printed
+
+
+@pytest.mark.slow
+def test_the_page_on_choosing_says_what_the_kept_tables_do(tmp_path):
+    """The committed page, pictures aside, is exactly what the script writes."""
+    pictures = make("make_comparison.py", tmp_path)
+    fresh = (tmp_path / "choosing.md").read_text(encoding="utf-8")
+    assert (DOCS / "choosing.md").read_text(encoding="utf-8") == fresh
+    assert pictures <= {path.name for path in (DOCS / "images").iterdir()}
+
+
 @pytest.mark.slow
 def test_the_pictures_of_the_ideas_can_be_drawn_again(tmp_path):
     pictures = make("make_pictures.py", tmp_path)

@@ -9,6 +9,7 @@ import numpy as np
 
 import qbumpers
 from qbumpers.assistants import register_assistant
+from qbumpers.learners import ModelBased, PowerLaw, SoftmaxQLearner
 from qbumpers.networks import Network
 from qbumpers.simulation import run
 from tests.assistants.own_rules import BudgetOptions, full_budget, guide_within_budget, spend
@@ -43,6 +44,10 @@ def conditions():
         "table": on_the_cliff(BUMPERS, episodes=4),
         "chance": in_a_random_world(),
         "own": on_the_cliff(("pocket money", {"budget": 20}), episodes=4, learner=averaging),
+        "power law": on_the_cliff(
+            BUMPERS, episodes=4, learner=SoftmaxQLearner(), forgetting=PowerLaw()
+        ),
+        "model": on_the_cliff(BUMPERS, episodes=2, learner=ModelBased()),
         "network": in_the_corridor(*bumpers, episodes=3),
         "dueling network": in_the_corridor(*bumpers, learner=dueling, episodes=3),
     }

@@ -25,4 +25,5 @@ gymnasium.register(
     id="qbumpers/MountainCar-v0",
     entry_point="qbumpers.tasks.mountain_car:MountainCar",
     max_episode_steps=200,
+    reward_threshold=-110.0,
 )

@@ -136,7 +136,7 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         )
         has = {
             "states": discrete,
-            "dynamics": model.dynamics is not None,
+            "dynamics": model.dynamics is not None and self._seen is None,
             "distance": task is not None and task.has_distance,
             "undo": True,  # undo_of has looked
             "no_op": model.no_op >= 0,

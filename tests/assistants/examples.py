@@ -24,6 +24,8 @@ EXAMPLES: dict[str, dict[str, Any]] = {
     "assist-as-needed": {"forgetting": 0.5, "gain": 1.0, "dead_band": 0.125, "v_min": -10.0},
     "undo": {"tolerance": 0.5},
     "correct": {"tolerance": 0.5},
+    "learner-aware-bumpers": {"alpha": 0.4, "v_min": -10.0},
+    "model-free-learner-aware-bumpers": {"alpha": 0.4, "v_min": -10.0},
     "budget": {"per_episode": 3, "of": BUMPERS},
     "fading": {"half_life": 1.5, "of": BUMPERS},
     "hysteresis": {"calm": 2, "of": BUMPERS},

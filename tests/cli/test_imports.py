@@ -40,7 +40,7 @@ def test_what_a_module_registers_is_listed(pond, call):
     assert status == 0
     assert "own-walk a task of your own" in output
     assert "Pond-v0 an environment of an imported module; give a discount" in output
-    assert "cliff-walking a task of this package" in output
+    assert "cliff-walking Walk along a cliff" in output
 
 
 @pytest.mark.parametrize("arguments", [["Pond-v0", "--import", "own_pond"], ["own_pond:Pond-v0"]])

@@ -11,7 +11,7 @@ from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import run_experiment
 from qbumpers.experiments.sources import load_experiment, make_experiment
 from qbumpers.experiments.store import load
-from qbumpers.learners import Motor, Perception, Sarsa
+from qbumpers.learners import Motor, Perception, PowerLaw, Sarsa
 from tests.assistants.own_rules import watch
 from tests.experiments.examples import cells_of, ids_of, run_into, settings
 
@@ -53,6 +53,8 @@ def test_tables_of_a_learner_reach_its_condition():
          ["motor=0.1..0", "motor=0.2..0", "motor=0..0.3"]),
         ([{}, {"motor": {"slip": 0.1}}], ["motor=0..0", "motor=0.1..0"]),
         ([{"forgetting": [0.0, 0.1]}], ["forgetting=0", "forgetting=0.1"]),
+        ([{"forgetting": [0.02, {"decay": [0.5, 0.2]}]}],
+         ["forgetting=0.02", "forgetting={decay=0.5}", "forgetting={decay=0.2}"]),
         ([{"name": ["q-learning", "sarsa"]}], ["name=q-learning", "name=sarsa"]),
     ],
 )  # fmt: skip
@@ -73,11 +75,30 @@ def test_tables_are_swept_over_and_told_in_ids(learners, apart):
         ({"motor": {"slpi": 0.1}}, r"motor\.slpi = 0\.1: unknown field \(did you mean 'slip'"),
         ({"motor": {"lag": 2}}, r"motor\.lag = 2: .*less than or equal to 1"),
         ({"forgetting": 1.5}, r"forgetting = 1\.5: .*less than or equal to 1"),
+        (
+            {"forgetting": "all"},
+            r"learners\.forgetting = 'all'; a share in \[0, 1\] or a table with decay",
+        ),
+        ({"forgetting": {"decay": 0.0}}, r"forgetting\.decay = 0\.0: .*greater than 0"),
+        ({"forgetting": {"decya": 0.5}}, r"forgetting\.decya = 0\.5: .*mean 'decay'"),
     ],
 )
 def test_what_is_wrong_in_a_table_is_named(learner, message):
     with pytest.raises(RequestError, match=message):
         make_experiment(settings(learners=[learner]))
+
+
+def test_a_power_law_of_forgetting_reaches_its_condition_and_is_read_back(tmp_path):
+    learners = [{"forgetting": {"decay": 0.3}}, {"forgetting": {}}]
+    plan = make_plan(make_experiment(settings(learners=learners, assistants=NONE)))
+    found = [condition.forgetting for condition in plan.conditions.values()]
+    assert found == [PowerLaw(0.3), PowerLaw(0.5)]
+    folder = run_into(tmp_path, learners=learners, assistants=NONE, trials=1)
+    assert load(folder).experiment == load_experiment(folder / "experiment.toml")
+    assert load(folder).episodes["learner"].unique(maintain_order=True).to_list() == [
+        "q-learning/forgetting={decay=0.3}",
+        "q-learning/forgetting={decay=0.5}",
+    ]
 
 
 def test_sarsa_runs_beside_q_learning_and_goes_on_where_it_was(tmp_path):

@@ -93,6 +93,12 @@ def test_a_policy_that_balances_the_pole_reaches_the_threshold():
     assert (found.returned.mean, found.threshold, found.reached) == (500.0, 475.0, True)
 
 
+def test_the_threshold_of_a_registered_task_is_that_of_its_environment():
+    found = check_threshold(make_task("mountain-car"), shipped_expert("mountain-car"), episodes=10)
+    assert found is not None
+    assert (found.threshold, found.reached) == (-110.0, True)
+
+
 def test_one_that_does_not_is_warned_of_with_what_to_try():
     task = make_task("CartPole-v1", discount=0.99)
     with pytest.warns(ExpertWarning, match="solved from 475 on; try more steps"):

@@ -6,8 +6,15 @@ import pytest
 
 from qbumpers.errors import RequestError
 from qbumpers.experts import Recipe, choosing
-from qbumpers.experts.checking import MeanWithError
-from qbumpers.experts.choosing import Judgement, best, judge, train_several, with_provenance
+from qbumpers.experts.checking import ExpertWarning, MeanWithError
+from qbumpers.experts.choosing import (
+    Judgement,
+    best,
+    check_claim,
+    judge,
+    train_several,
+    with_provenance,
+)
 from qbumpers.learners import DoubleDQN, Schedule
 from qbumpers.networks import Network
 from qbumpers.tasks import make_task
@@ -143,3 +150,22 @@ def test_the_best_of_four_experts_balances_a_pole(tmp_path):
     trained = train_several(task, Recipe(learner, 100_000, 0), range(4), tmp_path)
     judgements = [judge(task, values, episodes=20) for values in trained]
     assert judgements[best(judgements)].greedy_return.mean >= 400
+
+
+def promising(claimed, achieved, error):
+    claims, returns = MeanWithError(claimed, error), MeanWithError(achieved, error)
+    return Judgement((), returns, claims, returns, None)
+
+
+@pytest.mark.parametrize(
+    ("claimed", "achieved", "error"), [(85.0, 100.0, 0.1), (50.0, 99.0, 12.0), (-24.0, -20.0, 0.1)]
+)
+def test_what_values_promise_may_be_off_by_a_fifth_or_by_chance(claimed, achieved, error):
+    assert check_claim(make_task("mountain-car"), promising(claimed, achieved, error))
+
+
+@pytest.mark.parametrize(("claimed", "achieved"), [(51.5, 99.3), (150.0, 99.3), (-10.0, -20.0)])
+def test_values_that_promise_something_else_are_warned_of(claimed, achieved):
+    said = f"predict a discounted return of {claimed} from the start, and .* achieve {achieved};"
+    with pytest.warns(ExpertWarning, match=said):
+        assert not check_claim(make_task("mountain-car"), promising(claimed, achieved, 0.5))

@@ -99,9 +99,10 @@ def test_a_transposed_matrix_is_contiguous():
 
 OTHERS: list[Any] = ["generic"]  # on x86-64 one without fused operations
 if platform.machine() == "x86_64":  # registers half as wide as those of later ones
-    OTHERS.append(pytest.param("haswell", marks=pytest.mark.slow))
+    OTHERS.append("haswell")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processor", OTHERS)
 def test_learners_have_the_same_bits_on_other_processors(processor):
     here, there = digests({}), digests({"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""})

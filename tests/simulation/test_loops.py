@@ -7,11 +7,17 @@ from qbumpers.assistants import registry
 from qbumpers.decisions import Step
 from qbumpers.learners import (
     PERCEPTIONS,
+    ActorCritic,
     ExpectedSarsa,
+    Imitator,
+    ModelBased,
     Motor,
     Perception,
+    PowerLaw,
     Sarsa,
     Schedule,
+    SoftmaxQLearner,
+    TwoRate,
 )
 from qbumpers.simulation import Script, record, run
 from qbumpers.tasks import cliff_walking
@@ -32,6 +38,7 @@ CLUMSY = Motor(slip=0.15, lag=0.25)
 SOMETIMES = Perception(0.3, "executed", 2.0)
 BUDGET = ("budget", {"of": {"name": BUMPERS[0], **BUMPERS[1]}, "per_episode": 3})
 WANDERING = Schedule(0.6, 0.2, 0.5)
+LIVELY = SoftmaxQLearner(0.8, 0.7, 0.5, 0.2)
 
 CONDITIONS = {
     "cliff, none": lambda: on_the_cliff(("none", {})),
@@ -76,6 +83,29 @@ CONDITIONS = {
         BUMPERS, learner=Sarsa(epsilon=WANDERING), motor=CLUMSY, forgetting=0.1
     ),
     "random world, forgetting": lambda: in_a_random_world(forgetting=0.3, retention=5),
+    "random world, by a power law": lambda: in_a_random_world(forgetting=PowerLaw(), retention=5),
+    "cliff, softmax": lambda: on_the_cliff(BUMPERS, learner=LIVELY),
+    "random world, softmax, by a power law": lambda: in_a_random_world(
+        learner=LIVELY._replace(initial_value=1.5), forgetting=PowerLaw(0.3)
+    ),
+    "cliff, actor-critic": lambda: on_the_cliff(BUMPERS, learner=ActorCritic(initial_value=3.0)),
+    "random world, actor-critic, by a power law": lambda: in_a_random_world(
+        learner=ActorCritic(0.8, Schedule(0.5, 0.1, 0.5)), forgetting=PowerLaw()
+    ),
+    "cliff, model": lambda: on_the_cliff(
+        BUMPERS, learner=ModelBased(epsilon=WANDERING), perception="observant"
+    ),
+    "random world, model, by a power law": lambda: in_a_random_world(
+        learner=ModelBased(0.8, WANDERING, 3, initial_value=1.5), forgetting=PowerLaw()
+    ),
+    "cliff, imitator": lambda: on_the_cliff(BUMPERS, learner=Imitator(WANDERING)),
+    "random world, imitator, forgetting": lambda: in_a_random_world(
+        learner=Imitator(WANDERING), perception="disruption", forgetting=0.3
+    ),
+    "cliff, two rates": lambda: on_the_cliff(BUMPERS, learner=TwoRate(epsilon=WANDERING)),
+    "random world, two rates, forgetting": lambda: in_a_random_world(
+        learner=TwoRate(0.8, WANDERING), forgetting=0.3
+    ),
     "random world, half seen": half_seen,
     "cliff, budget": lambda: on_the_cliff(BUDGET),
     **{
@@ -90,8 +120,14 @@ CONDITIONS = {
     ),
 }
 SEED, TRIALS = 11, range(2, 5)
-# What a perception does is one table; two of them stand for all where a step is taken back.
-LONGER = {f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]}
+# What a perception does is one table; two of them stand for all where a step is taken back. Of
+# forgetting it is tables of other widths that matter, those of the actor-critic and of the model.
+LONGER = {
+    *(f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]),
+    "random world, softmax, by a power law",
+    "random world, imitator, forgetting",
+    "random world, two rates, forgetting",
+}
 
 
 def plain_trial(condition, trial, seed=SEED):

@@ -75,7 +75,13 @@ STARTS = {
 }
 
 
-@pytest.mark.parametrize(("arguments", "script", "standard_input"), STARTS.values(), ids=STARTS)
+@pytest.mark.parametrize(
+    ("arguments", "script", "standard_input"),
+    [
+        pytest.param(*start, id=name, marks=[pytest.mark.slow] * (name != "a script without one"))
+        for name, start in STARTS.items()
+    ],
+)
 def test_two_processes_give_the_numbers_of_one(tmp_path, arguments, script, standard_input):
     (tmp_path / "script.py").write_text(script, encoding="utf-8")
     finished = subprocess.run(
@@ -95,7 +101,12 @@ LOCKED = UNGUARDED.replace("PUSH = 0.5", "import threading\nLOCK = threading.Loc
 @pytest.mark.parametrize(
     ("old", "new", "what"),
     [
-        ("self.place +=", "LOCK.locked(); self.place +=", "environment 'own/Line-v0'"),
+        pytest.param(
+            "self.place +=",
+            "LOCK.locked(); self.place +=",
+            "environment 'own/Line-v0'",
+            marks=pytest.mark.slow,
+        ),
         ("best = max(", "LOCK.locked(); best = max(", "assistant 'guide'"),
     ],
 )

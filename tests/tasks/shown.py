@@ -13,6 +13,7 @@ from qbumpers.tasks.displays.by_environment import display_maker
 ENVIRONMENTS = [
     "qbumpers/CliffWalking-v0",
     "qbumpers/LunarLander-v0",
+    "qbumpers/MountainCar-v0",
     "CliffWalking-v1",
     "FrozenLake-v1",
     "FrozenLake8x8-v1",

@@ -7,7 +7,11 @@ from gymnasium.envs.toy_text import CliffWalkingEnv
 from gymnasium.utils.env_checker import check_env
 
 import qbumpers  # noqa: F401 - registers the environment
-from qbumpers.tasks import CliffWalking, cliff_walking
+from qbumpers.errors import RequestError
+from qbumpers.tasks import CliffWalking, cliff_walking, make_task
+from qbumpers.tasks.cliff_walking import larger_cliff
+from qbumpers.tasks.drawing import picture
+from qbumpers.values import solve
 from tests.narrowing import of_kind, present
 from tests.tasks.examples import outcomes
 
@@ -153,3 +157,59 @@ def test_without_a_render_mode_nothing_is_drawn():
     environment = CliffWalking()
     environment.reset(seed=0)
     assert environment.render() is None
+
+
+def test_a_larger_cliff_of_the_papers_size_is_the_papers():
+    assert larger_cliff(4, 12).digest() == cliff_walking().digest()
+    assert larger_cliff(4, 12).identity() == cliff_walking().identity()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 3), (5, 7), (8, 24), (30, 12)])
+def test_the_shortest_path_along_a_larger_cliff_returns_87(rows, columns):
+    """Up, along the cliff, down: one step more than there are columns."""
+    task = make_task("larger-cliff", rows=rows, columns=columns)
+    state, total, terminated = columns * (rows - 1), 0.0, False
+    for action in [UP, *[RIGHT] * (columns - 1), DOWN]:
+        ((state, reward, terminated),) = outcomes(task, state, action)  # type: ignore[arg-type]
+        total += reward
+    assert (state, terminated, total) == (rows * columns - 1, True, 87.0)
+    assert solve(task)(columns * (rows - 1)).max() == 87.0
+
+
+def test_a_larger_cliff_has_the_rules_of_the_small_one():
+    task = larger_cliff(6, 9)
+    first, last = 45, 53
+    for state, action in np.ndindex(last, 4):
+        row, column = divmod(state, 9)
+        row += {UP: -1, DOWN: 1}.get(action, 0)
+        column += {LEFT: -1, RIGHT: 1}.get(action, 0)
+        to = 9 * min(max(row, 0), 5) + min(max(column, 0), 8)
+        fallen, arrived = first < to < last, to == last
+        reward = -100.0 if fallen else -1.0 + arrived * (100 - 3)
+        expected = {(first if fallen else to, reward, arrived): 1.0}
+        assert outcomes(task, state, action) == expected
+        assert bool(present(task.crash)[state, action, 0]) == fallen
+
+
+def test_the_limit_of_a_larger_cliff_grows_with_its_cells():
+    limits = [larger_cliff(*size).episode_limit for size in ((4, 12), (8, 12), (8, 24), (2, 3))]
+    assert limits == [100, 200, 400, 13]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"rows": 1}, r"rows = 1; it must lie in \[2, 100\]"),
+        ({"columns": 101}, r"columns = 101; it must lie in \[3, 100\]"),
+        ({"rows": "8"}, r"rows = '8'; a whole number in \[2, 100\] is needed"),
+    ],
+)
+def test_a_size_out_of_range_is_named(arguments, message):
+    with pytest.raises(RequestError, match=f"task 'larger-cliff': {message}"):
+        make_task("larger-cliff", **arguments)
+
+
+def test_the_picture_of_a_larger_cliff_has_its_cells():
+    shown = picture(larger_cliff(3, 5).display, 7)
+    assert shown.shape == (3 * 64, 5 * 64, 3)
+    assert orange_cells(shown) == {(1, 2)}

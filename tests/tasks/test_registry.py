@@ -17,6 +17,7 @@ from qbumpers.tasks import (
     register_task,
     task_names,
 )
+from qbumpers.tasks.registry import explanations
 from tests.narrowing import of_kind
 from tests.tasks.examples import random_task
 
@@ -24,6 +25,34 @@ from tests.tasks.examples import random_task
 def test_cliff_walking_is_there_by_name():
     assert "cliff-walking" in task_names()
     assert make_task("cliff-walking").digest() == cliff_walking().digest()
+
+
+REMAPPED = {"of": "cliff-walking", "keys": (1, 2, 3, 0)}
+NAMED = {name: REMAPPED if name == "remapped" else {} for name in task_names()}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_every_task_has_a_display_and_a_line_of_explanation(name):
+    task = make_task(name, **cast(Any, NAMED[name]))
+    display = task.display
+    assert len(set(display.actions)) == task.actions
+    assert set(display.keys.values()) == set(range(task.actions))
+    line = explanations()[name]
+    assert line.endswith(".")
+    assert len(line) < 100
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_every_task_is_an_environment_that_gymnasium_accepts(name):
+    environment = make_task(name, **cast(Any, NAMED[name])).make_environment()
+    observation, _ = environment.reset(seed=0)
+    space = environment.observation_space
+    for step in range(20):
+        assert space.contains(observation)
+        observation, reward, terminated, truncated, _ = environment.step(step % 2)
+        assert isinstance(float(reward), float)
+        if terminated or truncated:
+            observation, _ = environment.reset()
 
 
 @pytest.mark.usefixtures("own_tasks")

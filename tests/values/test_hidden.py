@@ -94,3 +94,16 @@ def test_the_wrapper_shows_the_assistant_what_it_may_see():
     record = info["assistance"]
     assert (record["proposed"], record["overridden"]) == (2, True)
     assert record["executed"] in (0, 1, 3)
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [
+        lambda task, rule: SharedControl(task.make_environment(), rule, solve(task)),
+        lambda task, rule: simulate(task, rule, trials=1, episodes=1),
+    ],
+)
+def test_rules_that_follow_transitions_are_refused_where_states_are_half_seen(begin):
+    rule = make_assistant("trajectory-bumpers", path=(0, 1), reach=1)
+    with pytest.raises(RequestError, match="transitions"):
+        begin(hidden_goal(), rule)

@@ -1,12 +1,17 @@
-"""The expert that ships for Lunar Lander: how often it lands, and where it comes from."""
+"""The experts that ship: how often the lander's lands, and where each comes from.
+
+`tests/tasks/test_mountain_car.py` lets the other one drive.
+"""
 
 import gymnasium
 import numpy as np
 import pytest
 
 import qbumpers
-from qbumpers.experts import Recipe, train_expert
-from qbumpers.values import shipped_expert
+from qbumpers.experts import train_expert
+from qbumpers.experts.selecting import make_recipe
+from qbumpers.tasks.remapping import remapped
+from qbumpers.values import shipped_expert, shipped_values
 
 LANDER = "qbumpers/LunarLander-v0"
 
@@ -23,6 +28,7 @@ def lands(expert, environment, generator, epsilon):
             return info["success"]
 
 
+@pytest.mark.slow
 def test_it_lands_nearly_always_with_some_random_actions():
     """True rate at least 0.98 if it is as good as its record; 200 episodes then rarely miss 10."""
     expert, generator = shipped_expert("lunar-lander"), np.random.default_rng(5)
@@ -32,8 +38,18 @@ def test_it_lands_nearly_always_with_some_random_actions():
 
 
 @pytest.mark.slow
-def test_the_command_that_made_it_makes_it_again():
-    shipped = shipped_expert("lunar-lander")
-    assert "seed 7; the best of seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9;" in shipped.method
-    again = train_expert(qbumpers.make_task("lunar-lander"), Recipe(), seed=7)
+@pytest.mark.parametrize(("name", "seed"), [("lunar-lander", 7), ("mountain-car", 6)])
+def test_the_command_that_made_it_makes_it_again(name, seed):
+    shipped, task = shipped_expert(name), qbumpers.make_task(name)
+    assert f"seed {seed}; the best of seeds 0, 1, 2, 3, 4, 5, 6, 7, 8, 9;" in shipped.method
+    again = train_expert(task, make_recipe(task), seed=seed)
     assert np.array_equal(again.parameters, shipped.parameters)
+
+
+def test_a_remapped_task_has_the_expert_of_the_other_one_and_others_their_own():
+    task = qbumpers.make_task("mountain-car")
+    observation = np.array([-0.6, 0.01], np.float32)
+    expert = shipped_expert("mountain-car")(observation)
+    assert np.array_equal(shipped_values(task)(observation), expert)
+    turned = shipped_values(remapped(task, (2, 1, 0)))(observation)
+    assert turned == pytest.approx(expert[::-1], rel=1e-6)

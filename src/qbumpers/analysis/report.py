@@ -87,14 +87,14 @@ def write_report(
             _write(folder / name, table.write_csv().encode())
         _write(folder / TRIALS, _parquet(findings.trials))
         pictures = []
-        for name, picture in _pictures(folder / FIGURES, drawings(results, findings), artists):
+        for name, drawn in _pictures(folder / FIGURES, drawings(results, findings), artists):
             advance(f"figure {name}")
-            pictures.append(picture())
+            pictures.append(drawn())
     advance(REPORT)
     text = page(folder, results, findings, pictures, tables)
     _write(folder / REPORT, text.encode())
     _clear(folder, {*tables})
-    _clear_figures(folder / FIGURES, {picture.name for picture in pictures})
+    _clear_figures(folder / FIGURES, {each.name for each in pictures})
     return findings
 
 
@@ -180,14 +180,23 @@ def _pictures(
 ) -> list[tuple[str, Callable[[], Picture]]]:
     """The name of each figure, and what waits until it is drawn or draws it."""
     if artists is None:
-        return [(each.name, partial(_picture, folder, each)) for each in drawings]
-    return [
-        (each.name, submit_unheard(artists, _picture, folder, each).result) for each in drawings
-    ]
+        return [(each.name, partial(picture, folder, each)) for each in drawings]
+    return [(each.name, submit_unheard(artists, picture, folder, each).result) for each in drawings]
 
 
-def _picture(folder: Path, drawing: Drawing) -> Picture:
-    """Draw a figure and write it, with the numbers behind it."""
+def picture(folder: Path, drawing: Drawing) -> Picture:
+    """Draw a figure and write it as PNG and SVG, with the numbers behind it as CSV.
+
+    Args:
+        folder: where the files go.
+        drawing: what is drawn.
+
+    Returns:
+        The figure, for a page.
+
+    Raises:
+        StoreError: if a file cannot be written.
+    """
     numbers = drawing.numbers.with_columns(pl.selectors.float().round_sig_figs(8)).write_csv()
     _write(folder / f"{drawing.name}.csv", numbers.encode())
     with _without_collection():

@@ -15,13 +15,14 @@ from qbumpers.decisions import Decision, Model, Noise, Situation, Step, checked_
 from qbumpers.errors import RequestError, checked, unknown_name
 from qbumpers.registration import as_numbers, files_in
 
-_WORDS = {
+NEEDED_THINGS = {
     "states": "numbered states",
     "dynamics": "table of transitions",
     "distance": "distance between actions",
     "undo": "state that can be taken back (snapshot and restore)",
     "no_op": "action that does nothing (no_op)",
 }
+"""What a rule may need of a task, in words, for each of `NEEDS`."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,8 @@ class Assistant:
         for need in NEEDS:
             if need in self.needs and not has[need]:
                 raise RequestError(
-                    f"assistant {self.name}: task {task} has no {_WORDS[need]}, which it needs"
+                    f"assistant {self.name}: task {task} has no {NEEDED_THINGS[need]}, which it "
+                    "needs"
                 )
         kind = "states" if has["states"] else "vectors"
         for rule in self.chain:

@@ -1,6 +1,7 @@
 """The command line. Exit status: 0 done, 1 it failed, 2 the request was wrong."""
 
 # Their commands register.
+from qbumpers.cli import compare as compare
 from qbumpers.cli import experiments as experiments
 from qbumpers.cli import expert as expert
 from qbumpers.cli import listing as listing

@@ -241,6 +241,7 @@ def _hidden(text: str) -> list[int]:
 def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None:
     from qbumpers.experts import check_expert
     from qbumpers.experts.checking import check_threshold
+    from qbumpers.experts.choosing import check_claim
     from qbumpers.experts.selecting import train_best
 
     with _steps_bar() as bar:
@@ -255,6 +256,7 @@ def _train(task: "Task", recipe: "Recipe", seeds: list[int], path: Path) -> None
     OUTPUT.print(_judgements(task, seeds, found.judgements))
     with expert_warnings_printed():
         check_expert(task, found.values)
+        check_claim(task, found.judgements[found.best])
         solved = check_threshold(task, found.values)
     if solved is not None and solved.reached:
         OUTPUT.print(
@@ -304,7 +306,7 @@ def _number(found: "MeanWithError", digits: int) -> str:
 
 def _check(task: "Task", path: Path, figures: Path | None) -> None:
     from qbumpers.experts import check_expert
-    from qbumpers.experts.choosing import judge
+    from qbumpers.experts.choosing import check_claim, judge
     from qbumpers.experts.loading import load_network
     from qbumpers.experts.quality import check_values, summarise
 
@@ -315,6 +317,7 @@ def _check(task: "Task", path: Path, figures: Path | None) -> None:
     OUTPUT.print(_judgements(task, ["-"], [judgement]))
     with expert_warnings_printed():
         check_expert(task, values)
+        check_claim(task, judgement)
     with OUTPUT.status("going where learners go"):
         checks = check_values(task, values, discount=values.discount)
     found = summarise(checks)

@@ -73,7 +73,7 @@ def _list_learners() -> Table:
     from qbumpers.learners import learners
 
     listing = table("learner", "settings (with defaults)", "learns from", "what it does")
-    for name, learner in learners().items():
+    for name, learner in sorted(learners().items()):
         kind: Any = learner.settings_type
         defaults: dict[str, Any] = kind._field_defaults
         settings = [f"{field} = {_short(value)}" for field, value in defaults.items()]

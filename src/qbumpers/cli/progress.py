@@ -13,6 +13,7 @@ from qbumpers.cli.console import ERRORS, OUTPUT, duration
 from qbumpers.errors import counted
 
 if TYPE_CHECKING:
+    from qbumpers.comparison.running import ComparisonProgress
     from qbumpers.experiments.run import RunProgress
     from qbumpers.tuning import TuningProgress
 
@@ -57,7 +58,7 @@ class TrialProgress:
                 self._bar.update(each.id, total=done, ends=None, whole=counted(done, "trial"))
         self._bar.stop()
 
-    def show(self, done: "RunProgress | TuningProgress") -> None:
+    def show(self, done: "RunProgress | TuningProgress | ComparisonProgress") -> None:
         """Show how far it is."""
         if self._begun is None:
             self._begun = time.monotonic()
@@ -68,7 +69,7 @@ class TrialProgress:
                 ERRORS.print(f"changed: {escape(reason)}", soft_wrap=True)
             self._announce(done)
             self._bar.start()
-            expected = getattr(done, "expected", None)  # a race cannot tell
+            expected = getattr(done, "expected", None)  # others cannot tell
             self._before = Before(done.trials, expected)
             self._task = self._bar.add_task(
                 self._what, total=done.of, rate="", ends=None, whole=counted(done.of, "trial")

@@ -8,6 +8,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationError,
     ValidationInfo,
     create_model,
@@ -16,13 +17,22 @@ from pydantic import (
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.models import Model, model_fields_of, model_of, settings_of
-from qbumpers.learners import PERCEPTIONS, Motor, Perception, learner_type, learners
+from qbumpers.learners import (
+    PERCEPTIONS,
+    Motor,
+    Perception,
+    PowerLaw,
+    learner_type,
+    learners,
+)
 
 RECORDED = "recorded"
 """Context in which settings are read that ran before: what they name need not be there any more."""
 
 _PerceptionDesign: Any = model_of(Perception)
 _MotorDesign: Any = model_of(Motor)
+_PowerLawDesign: Any = model_of(PowerLaw)
+_Share: Any = TypeAdapter(Annotated[float, Field(ge=0, le=1)], config=ConfigDict(strict=True))
 
 
 def _known_perception(given: Any) -> Any:
@@ -40,6 +50,16 @@ def _known_motor(given: Any) -> Any:
     return None if given is None else _MotorDesign.model_validate(given)
 
 
+def _known_forgetting(given: Any) -> Any:
+    if isinstance(given, dict | _PowerLawDesign):
+        return _PowerLawDesign.model_validate(given)
+    if not isinstance(given, float | int):
+        raise RequestError(
+            f"learners.forgetting = {given!r}; a share in [0, 1] or a table with decay is needed"
+        )
+    return _Share.validate_python(given)
+
+
 class LearnerDesign(Model):
     """A simulated learner. In a file, a field given as a list is swept over.
 
@@ -49,18 +69,19 @@ class LearnerDesign(Model):
     Attributes:
         name: a registered kind of learner.
         perception: what it believes happened when it was overridden, the name of a perception or a
-            table with `notices`, `credits` and `penalty`.
+            table with `notices`, `credits` and `penalty`; what its kind has by itself if left out.
         penalty: what an override feels like under a named perception that includes disruption, in
             reward units.
         motor: how its hand errs, a table with `slip` and `lag`.
-        forgetting: share of what it learned that a learner of a table forgets between episodes.
+        forgetting: share of what it learned that a learner of a table forgets between episodes, or
+            a table with `decay`, the exponent of a power law of the time since the last practice.
     """
 
     name: str
     perception: Annotated[Any, BeforeValidator(_known_perception)] = "transition"
     penalty: Annotated[float, Field(allow_inf_nan=False)] = 1.0
     motor: Annotated[Any, BeforeValidator(_known_motor)] = None
-    forgetting: Annotated[float, Field(ge=0, le=1)] = 0.0
+    forgetting: Annotated[Any, BeforeValidator(_known_forgetting)] = 0.0
 
     def setup(self, task_discount: float) -> dict[str, Any]:
         """What `make_condition` needs to know of the learner, at a task of that discount."""
@@ -70,12 +91,16 @@ class LearnerDesign(Model):
             "perception": self._perceived(),
             "penalty": self.penalty,
             "motor": Motor(**motor),
-            "forgetting": self.forgetting,
+            "forgetting": self._forgotten(),
         }
 
     def _perceived(self) -> str | Perception:
         given = self.perception
         return given if isinstance(given, str) else Perception(**given.model_dump())
+
+    def _forgotten(self) -> float | PowerLaw:
+        given = self.forgetting
+        return given if isinstance(given, float) else PowerLaw(**given.model_dump())
 
     def learner(self, task_discount: float) -> Any:
         """The settings of its kind, at a task of that discount."""
@@ -88,6 +113,7 @@ class LearnerDesign(Model):
     def described(self) -> dict[str, Any]:
         """Every field in the order in which ids show them."""
         fields = {**self.model_dump(), "perception": self._perceived()}
+        fields["forgetting"] = self._forgotten()
         fields["motor"] = fields["motor"] or Motor()._asdict()
         last = {name: fields.pop(name) for name in ("penalty", "motor", "forgetting")}
         return {**fields, **last}
@@ -104,6 +130,8 @@ def _design_of(kind: type, name: str) -> type[LearnerDesign]:
     if "discount" in fields:
         fields["discount"] = (fields["discount"][0] | None, None)
     fields["name"] = (Literal[name], name)
+    perception = LearnerDesign.model_fields["perception"]
+    fields["perception"] = (Annotated[Any, *perception.metadata], learner_type(name).perception)
     return create_model(f"{kind.__name__}Design", __base__=LearnerDesign, **fields)
 
 
@@ -150,7 +178,7 @@ def field_names() -> list[str]:
         kind = learner_type(name).settings_type
         for default in kind._field_defaults.values():  # type: ignore[attr-defined]
             names |= set(getattr(default, "_fields", ()))
-    return sorted(names | {*Motor._fields, *Perception._fields})
+    return sorted(names | {*Motor._fields, *Perception._fields, *PowerLaw._fields})
 
 
 def apart(learner: LearnerDesign, among: Sequence[LearnerDesign], mark: str) -> str:
@@ -182,6 +210,8 @@ def written(value: Any) -> str:
         return _inline_table(value)
     if isinstance(value, Perception):
         return _table_of_perception(value)
+    if isinstance(value, PowerLaw):
+        return f"{{decay={written(value.decay)}}}"
     if isinstance(value, dict):  # settings within settings
         return "..".join(written(part) for part in value.values())
     if isinstance(value, list | tuple):

@@ -66,9 +66,9 @@ def _others(given: Any) -> list[Any]:
 
 
 def tables_listed(learner: dict[str, Any]) -> dict[str, Any]:
-    """A learner whose perception and motor noise are swept over if something in them is."""
+    """A learner whose tables of layers around it are swept over if something in them is."""
     listed = dict(learner)
-    for field in learner.keys() & {"perception", "motor"}:
+    for field in learner.keys() & {"perception", "motor", "forgetting"}:
         given = learner[field] if isinstance(learner[field], list) else [learner[field]]
         found = [
             table

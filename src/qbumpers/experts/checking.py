@@ -126,7 +126,8 @@ def check_threshold(
     Warns:
         ExpertWarning: if the mean return is below the threshold.
     """
-    spec = gymnasium.registry.get(task.name)
+    made = task.environment_spec
+    spec = gymnasium.registry.get(made.id if made else task.name)
     stated = None if spec is None else spec.reward_threshold
     if spec is None or stated is None or task.episode_limit < (spec.max_episode_steps or 0):
         return None

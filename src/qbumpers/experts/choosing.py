@@ -1,6 +1,8 @@
 """Several experts trained alike, judged by a rule fixed beforehand, and the best of them kept."""
 
+import math
 import uuid
+import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -10,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.errors import RequestError
-from qbumpers.experts.checking import MeanWithError, mean_with_error
+from qbumpers.experts.checking import ExpertWarning, MeanWithError, mean_with_error
 from qbumpers.experts.episodes import Episode, discounted_return, play_several
 from qbumpers.experts.training import Recipe, train_expert
 from qbumpers.random_streams import content_digest
@@ -24,6 +26,8 @@ SETTINGS = ((0.02, 0), (0.1, 0), (0.02, 50))
 
 EPISODES = 100
 """That judge, of each setting."""
+
+_FAR = 0.2  # share of what is achieved by which values may be off at the start
 
 
 class Judgement(NamedTuple):
@@ -44,6 +48,36 @@ class Judgement(NamedTuple):
     start_value: MeanWithError
     start_return: MeanWithError
     crash_value: MeanWithError | None
+
+
+def check_claim(task: Task, judgement: Judgement) -> bool:
+    """Whether values promise what greedy episodes achieve; warn if they do not.
+
+    Args:
+        task: what was played.
+        judgement: of the values.
+
+    Returns:
+        Whether V(s_0) is within three standard errors of the discounted return, or within a fifth
+        of it.
+
+    Warns:
+        ExpertWarning: if it is not.
+    """
+    claimed, achieved = judgement.start_value, judgement.start_return
+    error = math.hypot(claimed.error, achieved.error)
+    allowed = max(3 * error, _FAR * abs(achieved.mean))
+    if abs(claimed.mean - achieved.mean) <= allowed:
+        return True
+    warnings.warn(
+        f"values of task {task.name}: they predict a discounted return of {claimed.mean:.1f} from "
+        f"the start, and greedy episodes achieve {achieved.mean:.1f}; assistants that go by the "
+        "projected return, as bumpers do, override too late or too often by such values: correct "
+        "them, qbumpers expert --check FILE --corrected FILE",
+        ExpertWarning,
+        stacklevel=2,
+    )
+    return False
 
 
 def judge(task: Task, values: NetworkValues, *, episodes: int = EPISODES) -> Judgement:

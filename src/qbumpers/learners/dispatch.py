@@ -11,8 +11,9 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
-from qbumpers.compilation import INLINE, uncompiled
+from qbumpers.compilation import INLINE, inlined, uncompiled
 from qbumpers.errors import RequestError
+from qbumpers.learners.forgetting import Practice, fade, fade_by_age, grow_older
 from qbumpers.learners.interface import Shape, Transition
 from qbumpers.learners.registry import LearnerType, learner_for_settings
 
@@ -22,9 +23,20 @@ def start(settings: Any, shape: Shape, stream: np.ndarray) -> Any:
     return uncompiled(learner_for_settings(type(settings)).start)(settings, shape, stream)
 
 
-def fresh_memory(share: float | None, settings: Any, shape: Shape, stream: np.ndarray) -> Any:
-    """A learner's first memory once more, if anything is to be forgotten; 0 if `share` is None."""
-    return 0 if share is None else start(settings, shape, stream.copy())
+def fresh_memory(forgets: Any, settings: Any, shape: Shape, stream: np.ndarray) -> Any:
+    """A learner's first memory once more, if anything is to be forgotten.
+
+    Args:
+        forgets: the ways in which it forgets, a tuple.
+        settings: of the learner.
+        shape: of what it learns.
+        stream: uint64 [4], random stream of the memory; it does not change.
+
+    Returns:
+        The memory; 0 if all ways are None.
+    """
+    nothing = all(way is None for way in forgets)
+    return 0 if nothing else start(settings, shape, stream.copy())
 
 
 def begin(settings: Any, memory: Any, episode: int, episodes: int) -> Any:
@@ -69,19 +81,49 @@ def forget(memory: Any, fresh: Any, share: float) -> None:
     """Move every table of a memory towards what it was at first.
 
     Args:
-        memory: of a learner; of its fields, float64 [S, A] are tables.
+        memory: of a learner; of its fields, float64 [S, K] are tables.
         fresh: a memory of the same learner as it was at first.
         share: of the way, in [0, 1].
     """
-    for field, origin in zip(memory, fresh, strict=True):
-        if isinstance(field, np.ndarray) and field.ndim == 2 and field.dtype == np.float64:
-            _fade(field, origin, share)
+    for field, origin in _tables(memory, fresh):
+        fade(field, origin, share)
 
 
-def _fade(table: np.ndarray, origin: np.ndarray, share: float) -> None:
-    for state in range(table.shape[0]):
-        for action in range(table.shape[1]):
-            table[state, action] += share * (origin[state, action] - table[state, action])
+def forget_by_age(memory: Any, fresh: Any, practice: Practice) -> None:
+    """Move every table of a memory towards what it was at first, the older the less of the rest.
+
+    Args:
+        memory: of a learner; of its fields, float64 [S, K] are tables.
+        fresh: a memory of the same learner as it was at first.
+        practice: says how old each action in each state is.
+    """
+    for field, origin in _tables(memory, fresh):
+        fade_by_age(field, origin, practice)
+
+
+@inlined
+def forget_between(share: float | None, practice: Practice | None, memory: Any, fresh: Any) -> None:
+    """Move every table of a memory towards what it was at first, between two episodes.
+
+    Args:
+        share: as for `forget`; None if no share is forgotten.
+        practice: as for `forget_by_age`, then an episode older; None if age means nothing.
+        memory: of a learner.
+        fresh: a memory of the same learner as it was at first; anything if nothing is forgotten.
+    """
+    if share is not None:
+        forget(memory, fresh, share)
+    if practice is not None:
+        forget_by_age(memory, fresh, practice)
+        grow_older(practice)
+
+
+def _tables(memory: Any, fresh: Any) -> list[tuple[np.ndarray, np.ndarray]]:
+    return [
+        (field, origin)
+        for field, origin in zip(memory, fresh, strict=True)
+        if isinstance(field, np.ndarray) and field.ndim == 2 and field.dtype == np.float64
+    ]
 
 
 # What the overloads below return is the Python source of the learner's function: compiled into the
@@ -94,11 +136,10 @@ def _compiled_start(settings: Any, shape: Any, stream: Any) -> Any:
 
 
 @overload(fresh_memory, strict=False, jit_options=INLINE)
-def _compiled_fresh_memory(share: Any, settings: Any, shape: Any, stream: Any) -> Any:
-    # Numba prunes `share is None` only if it is so: what is returned else has another type.
-    if isinstance(share, types.NoneType):
-        return lambda share, settings, shape, stream: 0
-    return lambda share, settings, shape, stream: start(settings, shape, stream.copy())
+def _compiled_fresh_memory(forgets: Any, settings: Any, shape: Any, stream: Any) -> Any:
+    if all(isinstance(way, types.NoneType) for way in forgets.types):
+        return lambda forgets, settings, shape, stream: 0
+    return lambda forgets, settings, shape, stream: start(settings, shape, stream.copy())
 
 
 @overload(begin, strict=False, jit_options=INLINE)
@@ -129,23 +170,31 @@ def _compiled_learn(settings: Any, memory: Any, transition: Any, rates: Any, str
 
 @overload(forget, strict=False, jit_options=INLINE)
 def _compiled_forget(memory: Any, fresh: Any, share: Any) -> Any:
-    tables = [
+    return _for_each(_places_of_tables(memory), fade)
+
+
+@overload(forget_by_age, strict=False, jit_options=INLINE)
+def _compiled_forget_by_age(memory: Any, fresh: Any, practice: Any) -> Any:
+    return _for_each(_places_of_tables(memory), fade_by_age)
+
+
+def _places_of_tables(memory: Any) -> list[int]:
+    return [
         place
         for place, field in enumerate(memory.types)
         if isinstance(field, types.Array) and field.ndim == 2 and field.dtype == types.float64
     ]
-    return _fading(tables)
 
 
-def _fading(tables: list[int]) -> Callable[..., Any]:
-    """A function that fades the fields at these places; compiled code cannot loop over fields."""
-    if not tables:
-        return lambda memory, fresh, share: None
-    place, others = tables[0], register_jitable(_fading(tables[1:]))
-    fade = register_jitable(_fade)
+def _for_each(places: list[int], change: Callable[..., None]) -> Callable[..., Any]:
+    """A function that changes the fields at these places; compiled code cannot loop over fields."""
+    if not places:
+        return lambda memory, fresh, by: None
+    place, others = places[0], register_jitable(_for_each(places[1:], change))
+    change_field = register_jitable(change)
 
-    def fade_one(memory: Any, fresh: Any, share: Any) -> None:
-        fade(memory[place], fresh[place], share)
-        others(memory, fresh, share)
+    def change_one(memory: Any, fresh: Any, by: Any) -> None:
+        change_field(memory[place], fresh[place], by)
+        others(memory, fresh, by)
 
-    return fade_one
+    return change_one

@@ -35,6 +35,7 @@ class LearnerType:
         compiled: whether Numba could compile all of it.
         built_in: whether it belongs to this package, whose compiled code is kept on disk.
         revision: raised when the numbers that it gives change although its code does not show it.
+        imitates: whether it copies what was executed.
     """
 
     name: str
@@ -49,6 +50,12 @@ class LearnerType:
     compiled: bool
     built_in: bool
     revision: int = 1
+    imitates: bool = False
+
+    @property
+    def perception(self) -> str:
+        """Name of the perception that it has unless another one is asked for."""
+        return "observant" if self.imitates else "transition"
 
     @property
     def parts(self) -> tuple[Any, ...]:
@@ -83,6 +90,7 @@ def register_learner(
     begin: Callable[..., Any] | None = None,
     observes: Observes = "states",
     revision: int = 1,
+    imitates: bool = False,
 ) -> type:
     """Register a learner under a name; it then works in every simulator, in files and in `list`.
 
@@ -108,6 +116,9 @@ def register_learner(
         observes: "states" by number, or "vectors", float32 [D].
         revision: to be raised when the learner gives other numbers for a reason that its code does
             not show; finished trials are then simulated again.
+        imitates: whether it copies what was executed, and so has to see that. Its perception is
+            then "observant" unless another one is asked for, and one that never shows it the
+            executed action is refused.
 
     Returns:
         The class of its settings, with which `simulate` takes it: call it with fields by name.
@@ -129,7 +140,7 @@ def register_learner(
     built_in = all(map(is_of_package, (choose, prefer, policy, learn)))
     built_in = built_in and all(map(is_written_here, (settings_type, start, begin)))
     learner = LearnerType(
-        name, settings_type, *functions, observes, is_compiled(choose), built_in, revision
+        name, settings_type, *functions, observes, is_compiled(choose), built_in, revision, imitates
     )
     if not built_in:
         learner = _of_user(learner)

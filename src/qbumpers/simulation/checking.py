@@ -6,8 +6,16 @@ from typing import Any, cast
 import numpy as np
 
 from qbumpers.assistants import Assistant
-from qbumpers.errors import RequestError, checked, in_short
-from qbumpers.learners import Motor, learner_for_settings, learner_type
+from qbumpers.errors import RequestError, check_number, checked, in_short
+from qbumpers.learners import (
+    LearnerType,
+    Motor,
+    Perception,
+    PowerLaw,
+    learner_for_settings,
+    learner_type,
+)
+from qbumpers.learners import perception as named_perception
 from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
 from qbumpers.values.exact import SOLVED_ROWS, solved_rows
@@ -105,6 +113,52 @@ def checked_learner(task: Task, settings: Any) -> Any:
             f"{needed}, as have the learners {', '.join(task.learners)}"
         )
     return checked(type(settings), plain(settings), "learner")
+
+
+def checked_perception(learner: LearnerType, given: str | Perception | None) -> str | Perception:
+    """What a learner believes happened: a perception with numbers in range, or the name of one.
+
+    Args:
+        learner: a kind of learner.
+        given: as `Setup` has it; None for what this kind of learner has by itself.
+
+    Raises:
+        RequestError: if there is none of that name, a number is out of range, or the learner copies
+            what was executed and would never see it.
+    """
+    perception = learner.perception if given is None else given
+    if isinstance(perception, Perception):
+        perception = found = checked(Perception, perception._asdict(), "perception")
+    else:
+        found = named_perception(perception)
+    if learner.imitates and not (found.credits == "executed" and found.notices > 0):
+        raise RequestError(
+            f"perception = {in_short(given)}; learner {learner.name} copies what was executed, and "
+            'would never see it: "observant" is needed, or another that notices overrides and then '
+            'credits what was "executed"'
+        )
+    return perception
+
+
+def checked_forgetting(task: Task, given: Any) -> float | PowerLaw:
+    """A share that is forgotten, or a law, with numbers in range.
+
+    Raises:
+        RequestError: if it is neither, a number is out of range, or the task's learners have no
+            tables.
+    """
+    if isinstance(given, PowerLaw):
+        given = checked(PowerLaw, given._asdict(), "forgetting")
+    else:
+        check_number(given, "forgetting", "in [0, 1] or a PowerLaw")
+        if not 0 <= given <= 1:
+            raise RequestError(f"forgetting = {given!r}; it must lie in [0, 1]")
+    if given and not task.states:
+        raise RequestError(
+            f"forgetting = {given!r}; at task {task.name} learners observe vectors, and only "
+            "tables are forgotten"
+        )
+    return given
 
 
 def checked_motor(motor: Any) -> Motor:

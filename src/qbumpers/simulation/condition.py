@@ -12,18 +12,19 @@ from qbumpers.decisions import Model
 from qbumpers.errors import (
     RequestError,
     check_number,
-    checked,
     unknown_name,
     whole_number,
 )
-from qbumpers.learners import LearnerType, Motor, Perception, learner_for_settings
+from qbumpers.learners import LearnerType, Motor, Perception, PowerLaw, learner_for_settings
 from qbumpers.learners import perception as named_perception
 from qbumpers.random_streams import episode_streams, trial_streams
 from qbumpers.registration import as_numbers, files_from, files_in
 from qbumpers.simulation.checking import (
     check_kept,
+    checked_forgetting,
     checked_learner,
     checked_motor,
+    checked_perception,
     checked_values,
     plain,
 )
@@ -45,12 +46,13 @@ class Setup(TypedDict, total=False):
         learner: settings of a registered learner, for instance `QLearner()`; the paper's, with the
             task's discount, if left out.
         perception: what the learner believes happened when it was overridden, a `Perception` or the
-            name of one of `qbumpers.learners.PERCEPTIONS`; "transition" if left out.
+            name of one of `qbumpers.learners.PERCEPTIONS`; if left out "transition", or "observant"
+            if the learner imitates.
         penalty: what an override feels like to one of the named perceptions that include
             disruption, in reward units; 1 if left out.
         motor: how the learner's hand errs; never if left out.
         forgetting: share of the way back to what it knew at first that the learner of a table goes
-            between two episodes, in [0, 1]; 0 if left out.
+            between two episodes, in [0, 1], or a `qbumpers.learners.PowerLaw`; 0 if left out.
         episodes: of a trial, at least 1; 100 if left out.
         retention: further episodes in which the learner goes on without the assistant, each
             followed by a greedy one; 0 if left out.
@@ -63,7 +65,7 @@ class Setup(TypedDict, total=False):
     perception: str | Perception
     penalty: float
     motor: Motor
-    forgetting: float
+    forgetting: float | PowerLaw
     episodes: int
     retention: int
     common_random_numbers: bool
@@ -84,7 +86,7 @@ class Condition(NamedTuple):
         perception: what it believes happened, or the name of that.
         penalty: of a named perception that includes disruption, in reward units.
         motor: how its hand errs.
-        forgetting: share forgotten between two episodes.
+        forgetting: share forgotten between two episodes, or the law by which it is.
         episodes: E, assisted episodes of a trial, each followed by a greedy unassisted one.
         retention: R, further episodes in which the learner goes on without the assistant.
         common_random_numbers: whether trials of equal number draw equal numbers in every condition.
@@ -101,7 +103,7 @@ class Condition(NamedTuple):
     perception: str | Perception = "transition"
     penalty: float = 1.0
     motor: Motor = Motor()
-    forgetting: float = 0.0
+    forgetting: float | PowerLaw = 0.0
     episodes: int = 100
     retention: int = 0
     common_random_numbers: bool = False
@@ -159,7 +161,7 @@ class Condition(NamedTuple):
             if self.learner_type.name in _FIRST_LEARNERS
             else self.learner_type.name,
             "motor": plain(self.motor) if self.motor != Motor() else None,
-            "forgetting": self.forgetting,
+            "forgetting": plain(self.forgetting),
             "others": _digest(self.others) if self.assistant.values else "",
             "files": [*_file_digests(self.assistant), *map(_digest, self.files.values())],
         }
@@ -223,22 +225,18 @@ def make_condition(
     helper = assistant_of(assistant, "assistant")
     helper.check_task(task.name, had_by(task))
     table, others, gamma, rows = checked_values(task, helper, setup.get("values"))
-    perception = setup.get("perception", "transition")
-    if isinstance(perception, Perception):
-        perception = checked(Perception, perception._asdict(), "perception")
-    else:
-        named_perception(perception)
+    learner = checked_learner(task, setup.get("learner"))
     condition = Condition(
         task,
         table,
         others,
         gamma,
         helper,
-        checked_learner(task, setup.get("learner")),
-        perception,
+        learner,
+        checked_perception(learner_for_settings(type(learner)), setup.get("perception")),
         setup.get("penalty", 1.0),
         checked_motor(setup.get("motor", Motor())),
-        setup.get("forgetting", 0.0),
+        checked_forgetting(task, setup.get("forgetting", 0.0)),
         whole_number(setup.get("episodes", 100), "episodes", "from 1 up"),
         whole_number(setup.get("retention", 0), "retention", "from 0 up"),
         setup.get("common_random_numbers", False),
@@ -252,38 +250,29 @@ def make_condition(
 
 def _check_numbers(condition: Condition) -> None:
     check_number(condition.penalty, "penalty", "of reward units")
-    check_number(condition.forgetting, "forgetting", "in [0, 1]")
     if condition.episodes < 1:
         raise RequestError(f"episodes = {condition.episodes!r}; at least 1 is needed")
     if condition.retention < 0:
         raise RequestError(f"retention = {condition.retention!r}; 0 or more is needed")
-    if not 0 <= condition.forgetting <= 1:
-        raise RequestError(f"forgetting = {condition.forgetting!r}; it must lie in [0, 1]")
-    if condition.forgetting and not condition.task.states:
-        raise RequestError(
-            f"forgetting = {condition.forgetting!r}; at task {condition.task.name} learners "
-            "observe vectors, and only tables are forgotten"
-        )
 
 
 def had_by(task: Task) -> dict[str, bool]:
     """Whether a task has it, for each of what a rule may need."""
     return {
         "states": task.states > 0,
-        "dynamics": task.states > 0,
+        "dynamics": task.states > 0 and task.seen is None,  # rules count states as they are seen
         "distance": task.has_distance,
         "undo": task.undoable,
         "no_op": task.no_op >= 0,
     }
 
 
-def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | None, float | None]:
-    """Settings, perception, motor noise and forgetting as compiled loops take them."""
+def compiled_learner(condition: Condition) -> tuple[Any, Perception, Motor | None]:
+    """Settings, perception and motor noise as compiled loops take them."""
     motor = None if condition.motor == Motor() else condition.motor
-    forgetting = float(condition.forgetting) if condition.forgetting else None
     perception = as_numbers(condition.perceived())
     with files_from(condition.files):
-        return as_numbers(condition.learner), perception, motor, forgetting
+        return as_numbers(condition.learner), perception, motor
 
 
 def outcome_room(condition: Condition, trials: int) -> Outcomes:

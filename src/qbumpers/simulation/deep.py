@@ -117,7 +117,7 @@ class _Trial:
         )
         shape = Shape(0, task.observation_size, (0,) * task.actions)
         self._memory = start_learner(condition.learner, shape, self._streams[LEARNER])
-        self._settings, self._perception, self._motor, _ = compiled_learner(condition)
+        self._settings, self._perception, self._motor = compiled_learner(condition)
         self._numbers = np.zeros(5)
         self._assistance = _assistance(condition)
         self._rule_memory = condition.assistant.start(condition.model())

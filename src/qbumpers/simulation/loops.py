@@ -25,8 +25,9 @@ from qbumpers.decisions import (
     step_of,
 )
 from qbumpers.learners.dispatch import begin as begin_learner
-from qbumpers.learners.dispatch import choose, forget, fresh_memory, learn, prefer
+from qbumpers.learners.dispatch import choose, forget_between, fresh_memory, learn, prefer
 from qbumpers.learners.dispatch import start as start_learner
+from qbumpers.learners.forgetting import Practice, begin_practice, practise
 from qbumpers.learners.interface import Shape
 from qbumpers.learners.motor import move
 from qbumpers.learners.perception import believed, noticing, perceive
@@ -65,12 +66,14 @@ class LearnerStack(NamedTuple):
         perception: as numbers.
         motor: `Motor`; None if the hand never errs.
         forgetting: share of the way back to its first memory between episodes; None if 0.
+        practice: arrays that change, if it forgets by age; else None.
     """
 
     settings: Any
     perception: Any
     motor: Any
     forgetting: float | None
+    practice: Practice | None
 
 
 class When(NamedTuple):
@@ -208,6 +211,7 @@ def _assisted_episode(
                 believed(experience, state, next_state, event & TERMINATED != 0), rates,
                 streams[LEARNER],
             )  # fmt: skip
+            practise(learner.practice, state, experience.action)
         _count_assisted(sinks.counts, state, when.assisted, overridden)
         _keep(sinks.record, recorded, state, next_state, step)
         recorded += 1
@@ -261,15 +265,6 @@ def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int
             own[source, word] = streams[trial, episode, source, word]
 
 
-@inlined
-def _forget(forgetting: float | None, memory: Any, fresh: Any, episode: int) -> None:
-    """Move a memory towards what it was at first, between two episodes."""
-    if forgetting is None:
-        return
-    if episode > 0:
-        forget(memory, fresh, forgetting)
-
-
 @compiled
 def run_trials(
     model: Model, assistance: Assistance, learner: LearnerStack, streams: np.ndarray,
@@ -311,15 +306,18 @@ def run_trials(
     recorded = 0
     for trial in range(trials):
         _copy_streams(own, streams, trial, 0)
-        fresh = fresh_memory(learner.forgetting, learner.settings, shape, own_streams[LEARNER])
+        forgets = learner.forgetting, learner.practice
+        fresh = fresh_memory(forgets, learner.settings, shape, own_streams[LEARNER])
         held = start_learner(learner.settings, shape, own_streams[LEARNER])
         memory = borrow(held)
         rule_memory = start_rule(assistance.options, model)
+        begin_practice(learner.practice)
         for episode in range(episodes):
             if episode > 0 and streams.shape[1] > 1:
                 _copy_streams(own, streams, trial, episode)
             when = When(trial, episode, episode < training)
-            _forget(learner.forgetting, memory, fresh, episode)
+            if episode > 0:
+                forget_between(learner.forgetting, learner.practice, memory, fresh)
             rates = begin_learner(learner.settings, memory, episode, training)
             rule_memory, recorded = _assisted_episode(
                 dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,

@@ -7,6 +7,8 @@ import numpy as np
 from qbumpers.borrowing import read_only
 from qbumpers.compilation import uncompiled
 from qbumpers.decisions import Step
+from qbumpers.learners import PowerLaw
+from qbumpers.learners.forgetting import Practice, practice_for
 from qbumpers.simulation.condition import Condition, compiled_learner, outcome_room, streams
 from qbumpers.simulation.loops import (
     Assistance,
@@ -62,8 +64,17 @@ def _call_loops(
             read_only(condition.values), read_only(condition.others), seen, condition.discount,
             assistant.numbers, (0,) * task.actions,
         ),
-        LearnerStack(*compiled_learner(condition)),
+        LearnerStack(*compiled_learner(condition), *_forgetting(condition)),
         streams(condition, trials, seed),
         condition.retention,
         sinks,
     )  # fmt: skip
+
+
+def _forgetting(condition: Condition) -> tuple[float | None, Practice | None]:
+    """The share that is forgotten, and what is to be known of practice if that decides it."""
+    forgetting, task = condition.forgetting, condition.task
+    if isinstance(forgetting, PowerLaw):
+        episodes = condition.episodes + condition.retention
+        return None, practice_for(forgetting, task.states, task.actions, episodes)
+    return float(forgetting) if forgetting else None, None

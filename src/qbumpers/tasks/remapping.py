@@ -24,7 +24,7 @@ def remapped(task: Task, keys: Sequence[int]) -> Task:
     """A task in which each action does what another one does in the given task.
 
     For studies of how people learn keys anew: the key and the name of an action stay, so that "up"
-    is pressed as before, and what it does changes. Nothing that is shown tells what a key does now.
+    is pressed as before, and what it does changes; nothing shows that before it is pressed.
     What stands for no key at all stays what it was: no action while no key is down, and `no_op`,
     are those that do in this task what they did in the given one. Distances between actions follow
     what actions do.

@@ -94,7 +94,10 @@ class TabularTask:
     observation_size = 0
     undoable = True
     releases_gil = True
-    learners = ("q-learning", "sarsa", "expected-sarsa")
+    learners = (
+        "q-learning", "sarsa", "expected-sarsa", "softmax-q-learning", "actor-critic",
+        "model-based", "imitator", "two-rate",
+    )  # fmt: skip
     value_sources = ("exact", "q-learning")
     code = ()
     revision = 1

@@ -3,8 +3,8 @@
 import hashlib
 import io
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -95,6 +95,19 @@ class NetworkValues:
         workspace[: observations.size] = observations.ravel()
         values = forward(self.layout, self.parameters, workspace, states).astype(np.float64)
         return values[0] if observations.ndim == 1 else values
+
+    def reordered(self, actions: Sequence[int]) -> "NetworkValues":
+        """The same values with their actions in another order.
+
+        Args:
+            actions: [A], each once; action a has the values that action actions[a] has here.
+        """
+        parameters = self.parameters.copy()
+        for name, numbers in named_parameters(self.layout, parameters).items():
+            if name.startswith(("values.", "advantages.")):  # an output per action
+                numbers[:] = numbers[..., list(actions)]
+        others = {name: each.reordered(actions) for name, each in self.others.items()}
+        return replace(self, parameters=parameters, others=others)
 
     def check_fit(self, use: Use) -> None:
         """Compare them with what they are put to.

@@ -6,8 +6,8 @@ import json
 import math
 import operator
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, cast
 from zipfile import BadZipFile
@@ -123,6 +123,15 @@ class TabularValues:
                 f"their table has {counted(len(self.table), 'state')}, from 0 on"
             )
         return self.table[state]
+
+    def reordered(self, actions: Sequence[int]) -> "TabularValues":
+        """The same values with their actions in another order.
+
+        Args:
+            actions: [A], each once; action a has the values that action actions[a] has here.
+        """
+        others = {name: each.reordered(actions) for name, each in self.others.items()}
+        return replace(self, table=self.table[:, list(actions)], others=others)
 
     def check_fit(self, use: Use) -> None:
         """Compare them with what they are put to.

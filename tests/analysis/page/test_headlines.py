@@ -107,8 +107,23 @@ def test_a_best_that_never_overrode_is_told_to_be_no_assistance():
 
 
 def test_one_best_leaves_no_trade():
-    found = sentences_on(about()._replace(trade=None))
+    sure = dict.fromkeys(("assisted", "unassisted"), PERFORMS)
+    found = sentences_on(about()._replace(trade=None, leaders=sure))
     assert "One condition both performs and teaches best, so these results show no trade." in found
+    open_ = sentences_on(about()._replace(trade=None))
+    assert any(
+        sentence.endswith("not sure to be the best, so there may be one.") for sentence in open_
+    )
+
+
+def test_a_best_that_may_be_any_is_not_called_the_best():
+    every = TEACHES._replace(others=len(TEACHES.contenders or ()))
+    found = sentences_on(about()._replace(leaders={"assisted": PERFORMS, "unassisted": every}))
+    assert found[1] == (
+        "Which condition teaches best cannot be told from 30 learners per condition: each of 2 "
+        "others may be as good (95% for all at once) as No assistance, whose learners return the "
+        f"most, {MINUS}100.0 ± 35.0 per greedy unassisted episode."
+    )
 
 
 def test_single_trials_are_not_called_significant_or_sure():

@@ -55,6 +55,8 @@ def _about(about: LearnerFindings) -> Iterator[str]:
 
 def _leads(about: LearnerFindings, measure: str, leader: Leader) -> str:
     """Which condition is best in a measure, and how sure that is."""
+    if leader.contenders is not None and len(leader.contenders) == leader.others > 1:
+        return _open(about, measure, leader)
     row = about.summary.row(by_predicate=pl.col("condition") == leader.condition, named=True)
     idle = row["overrides_mean"] == 0 and row["assistant"] != "none"
     which = ", which never overrode," * idle
@@ -62,6 +64,17 @@ def _leads(about: LearnerFindings, measure: str, leader: Leader) -> str:
         f"{readable(leader.condition)}{which} {_VERBS[measure]} best: its learners return "
         f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode. "
         f"{_how_sure(leader, 'condition that overrides' if idle else 'other condition')}"
+    )
+
+
+def _open(about: LearnerFindings, measure: str, leader: Leader) -> str:
+    """That every other condition may be as good as the one of the best mean."""
+    row = about.summary.row(by_predicate=pl.col("condition") == leader.condition, named=True)
+    return (
+        f"Which condition {_VERBS[measure]} best cannot be told from {leader.trials} learners per "
+        f"condition: each of {leader.others} others may be as good (95% for all at once) as "
+        f"{readable(leader.condition)}, whose learners return the most, "
+        f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode."
     )
 
 
@@ -90,7 +103,12 @@ def listed(named: Sequence[str], more: int = 0) -> str:
 def _traded(about: LearnerFindings) -> str:
     """What is gained and lost between the condition that teaches and the one that performs best."""
     if about.trade is None:
-        return "One condition both performs and teaches best, so these results show no trade."
+        if all(leader.contenders == [] for leader in about.leaders.values()):
+            return "One condition both performs and teaches best, so these results show no trade."
+        return (
+            "One condition has the best mean of both, so these results show no trade; it is not "
+            "sure to be the best, so there may be one."
+        )
     found: Trade = about.trade
     between = about.frontier.filter("pareto").height - 2
     gained, lost = (_amount(one, about.decimals) for one in (found.gained, found.lost))

@@ -57,7 +57,9 @@ def page(
         HTML.
     """
     settings = (folder / EXPERIMENT).read_text(encoding="utf-8")
-    files = {name: _data("text/csv", table.write_csv().encode()) for name, table in tables.items()}
+    files = {
+        name: data_url("text/csv", table.write_csv().encode()) for name, table in tables.items()
+    }
     return _template().render(
         experiment=results.experiment,
         findings=findings,
@@ -65,8 +67,8 @@ def page(
         names=NAMES,
         kinds={picture.kind for picture in pictures},
         pictures=pictures,
-        data=_data,
-        files={**files, EXPERIMENT: _data("application/toml", settings.encode())},
+        data=data_url,
+        files={**files, EXPERIMENT: data_url("application/toml", settings.encode())},
         settings=settings,
         run=run_description(folder),
         command=findings.additions.command or f"qbumpers run {EXPERIMENT}",
@@ -74,14 +76,7 @@ def page(
 
 
 def _template() -> jinja2.Template:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("qbumpers.analysis.page"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {"number": format_number}
+    environment = page_environment("qbumpers.analysis.page")
     environment.globals |= {
         "panels": points.panels,
         "width": points.WIDTH,
@@ -92,7 +87,24 @@ def _template() -> jinja2.Template:
     return environment.get_template("report.html.j2")
 
 
-def _data(kind: str, content: bytes | str) -> Markup:
+def page_environment(*packages: str) -> jinja2.Environment:
+    """Templates of pages.
+
+    Args:
+        *packages: whose folders `templates` are looked in, one after the other.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(package) for package in packages]),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {"number": format_number}
+    return environment
+
+
+def data_url(kind: str, content: bytes | str) -> Markup:
     """Content as a data URL."""
     content = content.encode() if isinstance(content, str) else content
     return Markup(f"data:{kind};base64,{base64.b64encode(content).decode()}")

@@ -1,0 +1,367 @@
+"""Measure learner-aware bumpers against bumpers: `python docs/run_learner_aware.py [PART ...]`.
+
+Prints tables with verdicts, and keeps their numbers for the page in docs/data/learner-aware. All of
+it takes about half an hour on one core; `--trials 10` shows in a minute or two what it prints.
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from qbumpers import make_assistant, make_task, simulate, solve
+from qbumpers.analysis.hypervolume import hypervolume
+from qbumpers.learners import Motor, QLearner, make_learner
+from qbumpers.learners.schedules import Schedule
+from qbumpers.tasks import TabularTask, Task, cliff_walking
+from qbumpers.tasks.random_mdp import random_mdp
+from qbumpers.values import learn_values
+
+DATA = Path(__file__).with_name("data") / "learner-aware"
+SEED, REFERENCE_TRIALS, POINT_TRIALS = 41, 1_000, 2_000
+ALPHAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0)
+"""Of bumpers, whose alpha ends at 1, those above are had with a lower `v_min`."""
+
+PROFILES = {"figures": 0.9, "text": 0.1}
+"""Share of the episodes over which exploration and learning rate of a profile fall."""
+
+RESAMPLES = 4_000
+AWARE, MODEL_FREE = "learner-aware-bumpers", "model-free-learner-aware-bumpers"
+PERCEPTIONS = ("transition", "observant", "interruption")
+
+
+class Measured(NamedTuple):
+    """A task with the worst return that bumpers know of, and how many trials are affordable."""
+
+    make: Callable[[], Any]
+    v_min: float
+    trials: int
+
+
+TASKS = {
+    "cliff-walking": Measured(lambda: make_task("cliff-walking"), 0.0, 150),
+    "larger-cliff": Measured(lambda: make_task("larger-cliff"), 0.0, 40),
+    "frozen-lake": Measured(lambda: make_task("frozen-lake"), 0.0, 150),
+    "frozen-lake-8x8": Measured(lambda: make_task("frozen-lake-8x8"), 0.0, 60),
+    "taxi": Measured(lambda: make_task("taxi"), -20.0, 30),
+    "windy-gridworld": Measured(lambda: make_task("windy-gridworld"), -100.0, 100),
+    "inventory": Measured(lambda: make_task("inventory"), 0.0, 60),
+    "random-mdp": Measured(lambda: random_mdp(10), 0.0, 150),
+}
+STOCHASTIC = ("frozen-lake", "inventory", "random-mdp")
+
+
+def q_learner(task: Task, profile: str) -> QLearner:
+    """The learner of a profile."""
+    schedule = Schedule(1.0, 0.02, PROFILES[profile])
+    return QLearner(task.discount, schedule, schedule)
+
+
+def bumpers(alpha: float, v_min: float, start_value: float, **options: Any) -> Any:
+    """Bumpers whose alpha may exceed 1: then `v_min` lies that much lower."""
+    lower = start_value - max(alpha, 1.0) * (start_value - v_min)
+    return make_assistant("stochastic-q-bumpers", alpha=min(alpha, 1.0), v_min=lower, **options)
+
+
+def samples(task: Task, assistant: Any, trials: int, **setup: Any) -> np.ndarray:
+    """Assisted and unassisted returns by trial, float64 [T, 2]."""
+    found = simulate(task, assistant, trials=trials, seed=SEED, **setup).outcomes
+    return np.stack([found.assisted_return, found.unassisted_return]).mean(axis=2).T
+
+
+class Field(NamedTuple):
+    """The field in which methods are compared: a learner at a task.
+
+    Attributes:
+        task: what is learned.
+        measured: how it is measured.
+        setup: learner, perception and so on.
+        reference: float64 [2], assisted return of `none`, unassisted of `maximal`.
+        best: return of `maximal`, assisted.
+        start_value: the lowest V*(s_0).
+    """
+
+    task: TabularTask
+    measured: Measured
+    setup: dict[str, Any]
+    reference: np.ndarray
+    best: float
+    start_value: float
+
+
+def field_of(measured: Measured, trials: int, **setup: Any) -> Field:
+    """Fix the reference point before anything is compared."""
+    task = measured.make()
+    many = min(REFERENCE_TRIALS, 5 * trials)
+    without = samples(task, "none", many, **setup).mean(axis=0)
+    maximal = samples(task, "maximal", many, **setup).mean(axis=0)
+    values = np.asarray(solve(task).table)
+    start_value = float(values[task.start > 0].max(axis=1).min())
+    reference = np.array([without[0], maximal[1]])
+    return Field(task, measured, setup, reference, float(maximal[0]), start_value)
+
+
+def methods(field: Field, profile: str, name: str = AWARE) -> dict[str, list[Any]]:
+    """The rule, and two kinds of bumpers, with equally many settings."""
+    v_min, start = field.measured.v_min, field.start_value
+    literal = {"escalate": profile == "figures", "clip": profile == "figures"}
+    return {
+        "aware": [make_assistant(name, alpha=alpha, v_min=v_min) for alpha in ALPHAS],
+        "second": [bumpers(a, v_min, start, second=True, **literal) for a in ALPHAS],
+        "best": [bumpers(a, v_min, start) for a in ALPHAS],
+    }
+
+
+class Comparison(NamedTuple):
+    """Normalised hypervolumes of the rule and of bumpers, with their difference."""
+
+    aware: float
+    bumpers: float
+    low: float
+    high: float
+    points: dict[str, list[list[float]]]
+
+
+def compared(field: Field, profile: str, trials: int, intervals: int, name: str) -> Comparison:
+    """Compare; the interval holds simultaneously with others (Bonferroni)."""
+    found = {
+        method: [samples(field.task, each, trials, **field.setup) for each in settings]
+        for method, settings in methods(field, profile, name).items()
+    }
+    box = float(np.prod(np.maximum(field.best - field.reference, 1e-9)))
+
+    def covered(many: list[np.ndarray]) -> np.ndarray:
+        return hypervolume(np.stack(many, axis=-2), field.reference) / box
+
+    means = {method: [s.mean(axis=0) for s in each] for method, each in found.items()}
+    covers = {method: float(covered(each)) for method, each in means.items()}
+    rival = max(("second", "best"), key=lambda method: covers[method])
+    generator = np.random.default_rng(SEED)
+    resampled = {
+        method: covered([resample(s, generator) for s in found[method]])
+        for method in ("aware", rival)
+    }
+    tail = 100 * 0.05 / intervals / 2
+    low, high = np.percentile(resampled["aware"] - resampled[rival], [tail, 100 - tail])
+    points = {
+        method: [[*map(float, mean), *map(float, s.std(axis=0) / np.sqrt(len(s)))]
+                 for mean, s in zip(means[method], found[method], strict=True)]
+        for method in ("aware", rival)
+    }  # fmt: skip
+    return Comparison(covers["aware"], covers[rival], float(low), float(high), points)
+
+
+def resample(rows: np.ndarray, generator: np.random.Generator) -> np.ndarray:
+    """Means of resampled trials, float64 [RESAMPLES, 2]."""
+    weights = generator.multinomial(len(rows), np.full(len(rows), 1 / len(rows)), RESAMPLES)
+    return weights @ rows / len(rows)
+
+
+def verdict(found: Comparison) -> str:
+    """What the interval says."""
+    if found.low > 0:
+        return "ahead"
+    return "not behind" if found.low > -0.02 else "behind" if found.high < 0 else "open"
+
+
+def show(title: str, rows: Iterable[tuple[str, Comparison]]) -> dict[str, Any]:
+    """Print comparisons as they are made; returns them for the page."""
+    print(f"\n{title}\n{'':34}   aware bumpers  difference", flush=True)
+    kept = {}
+    for name, found in rows:
+        interval = f"{found.low:+.3f} .. {found.high:+.3f}"
+        numbers = f"{found.aware:8.3f}{found.bumpers:8.3f}  {interval}"
+        print(f"{name:34}{numbers}  {verdict(found)}", flush=True)
+        kept[name] = {**found._asdict(), "verdict": verdict(found)}
+    return kept
+
+
+def tasks_compared(names: Iterable[str], rule: str, trials: int | None) -> Any:
+    """Compare at tasks in both profiles, one after the other."""
+    names = list(names)
+    for name in names:
+        measured = TASKS[name]
+        for profile in PROFILES:
+            many = trials or measured.trials
+            learner = q_learner(measured.make(), profile)
+            field = field_of(measured, many, learner=learner)
+            yield f"{name}, {profile}", compared(field, profile, many, 2 * len(names), rule)
+
+
+def part_tasks(trials: int | None) -> Any:
+    """Eight tasks, both profiles, one rule, alpha alone swept."""
+    return show("Tasks, transition learners", tasks_compared(TASKS, AWARE, trials))
+
+
+def part_model_free(trials: int | None) -> Any:
+    """Stochastic tasks without a model."""
+    title = "Stochastic tasks, without a model of the task"
+    return show(title, tasks_compared(STOCHASTIC, MODEL_FREE, trials))
+
+
+def part_perceptions(trials: int | None) -> Any:
+    """Cliff Walking for learners of three perceptions."""
+
+    def rows() -> Any:
+        measured = TASKS["cliff-walking"]
+        many = trials or measured.trials
+        for perception in PERCEPTIONS:
+            for profile in PROFILES:
+                learner = q_learner(measured.make(), profile)
+                field = field_of(measured, many, learner=learner, perception=perception)
+                yield f"{perception}, {profile}", compared(field, profile, many, 6, AWARE)
+
+    return show("Cliff Walking, by perception", rows())
+
+
+def part_points(trials: int | None) -> Any:
+    """Points at Cliff Walking that were aimed at."""
+    task, kept = cliff_walking(), {}
+    print("\nCliff Walking, transition learners: assisted / unassisted (standard errors)")
+    aims = (
+        ("figures", (75.0, -115.0)),
+        ("text", (75.0, -250.0)),
+        ("text", (50.0, -107.0)),
+    )
+    alphas = sorted({*ALPHAS, 0.15, 0.17, 1.2})
+    for profile in PROFILES:
+        learner = q_learner(task, profile)
+        for alpha in alphas:
+            rows = samples(
+                task, make_assistant(AWARE, alpha=alpha), trials or POINT_TRIALS, learner=learner
+            )
+            mean, error = rows.mean(axis=0), rows.std(axis=0) / np.sqrt(len(rows))
+            kept[f"{profile} {alpha:g}"] = [*map(float, mean), *map(float, error)]
+            print(
+                f"{profile:8} alpha {alpha:<5g} {mean[0]:7.1f} ({error[0]:.1f}) / "
+                f"{mean[1]:8.1f} ({error[1]:.0f})",
+                flush=True,
+            )
+    for profile, (assisted, unassisted) in aims:
+        far_enough = {
+            name.split()[1]: (u - unassisted) / spread
+            for name, (a, u, _, spread) in kept.items()
+            if name.startswith(profile) and a >= assisted
+        }
+        alpha = max(far_enough, key=lambda each: far_enough[each])
+        above = far_enough[alpha]
+        said = "reached" if above > 2 else "reached by the mean alone" if above > 0 else "missed"
+        print(
+            f"{profile}: {assisted:g} assisted and more than {unassisted:g} unassisted: {said}, "
+            f"{above:+.1f} standard errors at alpha {alpha}"
+        )
+    return kept
+
+
+def part_speed(trials: int | None) -> Any:
+    """Million learner steps per second of processor time, one core."""
+    task, kept = cliff_walking(), {}
+    print("\nMillion learner steps a second, one core")
+    for profile in PROFILES:
+        setup = {"learner": q_learner(task, profile), "trials": trials or 200}
+        for alpha in (0.2, 1.0):
+            rates = []
+            for seed in range(4):  # the first compiles
+                begin = time.process_time()
+                found = simulate(task, make_assistant(AWARE, alpha=alpha), seed=seed, **setup)
+                rates.append(found.steps / (time.process_time() - begin) / 1e6)
+            kept[f"{profile} {alpha:g}"] = statistics.median(rates[1:])
+            print(f"{profile:8} alpha {alpha:g}: {kept[f'{profile} {alpha:g}']:.2f}", flush=True)
+    return kept
+
+
+def other_learners(task: TabularTask) -> dict[str, dict[str, Any]]:
+    """Learners that the rule was not made for, and values that are not exact."""
+    constant = Schedule(0.1, 0.1, 0.0)
+    return {
+        "Q-learning": {},
+        "SARSA": {"learner": make_learner("sarsa")},
+        "expected SARSA": {"learner": make_learner("expected-sarsa")},
+        "softmax": {"learner": make_learner("softmax-q-learning")},
+        "actor-critic": {"learner": make_learner("actor-critic")},
+        "two rates": {"learner": make_learner("two-rate")},
+        "model-based": {"learner": make_learner("model-based")},
+        "imitator": {"learner": make_learner("imitator")},
+        "constant rates": {"learner": QLearner(1.0, constant, constant)},
+        "slips of the hand": {"motor": Motor(slip=0.1)},
+        "forgetting": {"forgetting": 0.05},
+        "estimated values": {"values": learn_values(task, episodes=2_000, seed=SEED)},
+    }
+
+
+class Robustness(NamedTuple):
+    """What a setting that was chosen for one learner does for another.
+
+    Attributes:
+        assisted: mean return.
+        unassisted: mean return.
+        score: mean of both, as shares of the way from the reference point of Q-learning to the best
+            return.
+        regret: how much more score the best setting for this learner has.
+    """
+
+    assisted: float
+    unassisted: float
+    score: float
+    regret: float
+
+
+def part_robust(trials: int | None) -> Any:
+    """Alpha chosen with Q-learning in `figures`, scored on all others, at Cliff Walking."""
+    measured, chosen = TASKS["cliff-walking"], {}
+    many, kept = trials or measured.trials, {}
+    usual = field_of(measured, many)
+    print("\nCliff Walking, alpha chosen with Q-learning: assisted / unassisted, score (regret)")
+    rivals = methods(usual, "figures")
+    rivals.pop("second")
+    for name, setup in other_learners(measured.make()).items():
+        kept[name] = {}
+        for method, settings in rivals.items():
+            means = [samples(usual.task, s, many, **setup).mean(axis=0) for s in settings]
+            scores = [float(np.mean((m - usual.reference) / (usual.best - usual.reference)))
+                      for m in means]  # fmt: skip
+            place = chosen.setdefault(method, int(np.argmax(scores)))
+            assisted, unassisted = map(float, means[place])
+            regret = max(scores) - scores[place]
+            found = Robustness(assisted, unassisted, scores[place], regret)
+            kept[name][method] = {"alpha": ALPHAS[place], **found._asdict()}
+        print(f"{name:20}", *(
+            f"{'bumpers' if method == 'best' else method} (alpha {each['alpha']:g}) "
+            f"{each['assisted']:7.1f} / {each['unassisted']:8.1f}, "
+            f"{each['score']:6.2f} ({each['regret']:.2f})   "
+            for method, each in kept[name].items()
+        ), flush=True)  # fmt: skip
+    return kept
+
+
+PARTS = {
+    "points": part_points,
+    "tasks": part_tasks,
+    "perceptions": part_perceptions,
+    "robust": part_robust,
+    "model-free": part_model_free,
+    "speed": part_speed,
+}
+
+
+def main() -> None:
+    """Measure what was asked for, and keep the numbers of full runs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    parser.add_argument("--trials", type=int, help="of every condition; nothing is kept then")
+    given = parser.parse_args()
+    for name in given.parts or PARTS:
+        kept = PARTS[name](given.trials)
+        if given.trials is None:
+            DATA.mkdir(parents=True, exist_ok=True)
+            text = json.dumps(kept, indent=1, default=float)
+            (DATA / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

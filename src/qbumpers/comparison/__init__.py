@@ -1,0 +1,1 @@
+"""All assistants on several tasks and learners, compared at equal amounts of help."""
