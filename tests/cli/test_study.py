@@ -45,6 +45,28 @@ def test_options_of_a_rule_over_a_rule_are_written_as_in_files(call, tmp_path, m
     assert found[1].options["of"] == "maximal"
 
 
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        (["--alpha", "0.5", "--v-min", "-200"], {"alpha": 0.5, "v_min": -200}),
+        (
+            ["--v-min=-200", "--second", "--alpha=0.5"],
+            {"alpha": 0.5, "v_min": -200, "second": True},
+        ),
+    ],
+)
+def test_every_way_to_write_an_option_is_understood(call, monkeypatch, arguments, options):
+    from qbumpers.study import running
+    from qbumpers.study.game import Choice, Game
+    from qbumpers.study.setup import Setup
+
+    found = []
+    monkeypatch.setattr(running, "play", lambda setup, choice, *_, **__: found.append(choice))
+    assert call("play", "mountain-car", *arguments)[0] == 0
+    assert found == [Choice("stochastic-q-bumpers", options)]
+    Game(Setup("mountain-car"), 0).begin(found[0])
+
+
 def test_a_record_that_is_not_there_cannot_be_replayed(call, tmp_path):
     status, _, errors = call("study", "replay", str(tmp_path / "absent.sqlite"))
     assert (status, errors.startswith("error: records file")) == (2, True)
