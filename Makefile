@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test test-docs test-slow lint bench docs dist clean
+.PHONY: help demo test test-docs test-slow test-study lint bench docs dist clean
 
 help:  ## Show what there is to make
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -11,13 +11,17 @@ demo: $(VENV)/installed  ## Repeat the paper's Cliff Walking experiment, with fi
 	$(BIN)/qbumpers reproduce cliff-walking --out demo
 
 test: $(VENV)/installed-dev  ## Run the tests, some minutes
-	$(BIN)/pytest -m "not slow and not documentation" -n 2 --dist worksteal
+	$(BIN)/pytest -m "not slow and not documentation and not study" -n 2 --dist worksteal
 
 test-docs: $(VENV)/installed-dev  ## Run what the pages and examples show, and compare what they print
 	$(BIN)/pytest -m "documentation and not slow" -n 2 --dist worksteal
 
 test-slow: $(VENV)/installed-dev  ## Run the longer checks
 	$(BIN)/pytest -m slow -n 2 --dist worksteal
+
+test-study: $(VENV)/installed-dev  ## Play in a real browser: keys, touch, reloads, a killed server
+	.ci/install_browser
+	$(BIN)/pytest -m study tests/study
 
 lint: $(VENV)/installed-dev $(VENV)/installed-docs  ## Check style, types and which way imports point
 	$(BIN)/ruff check .
@@ -38,7 +42,7 @@ dist: $(VENV)/installed-dist  ## Build the distributions into dist/, check them,
 	$(BIN)/python .ci/try_dist.py dist
 
 clean:  ## Remove what make made
-	rm -rf $(VENV) demo site dist
+	rm -rf $(VENV) .browser demo site dist
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.12")'

@@ -278,3 +278,30 @@ def test_the_walker_is_the_packages_task():
             expected = (int(task.next_state[place]), float(task.reward[place]))
             assert found[:2] == expected
             assert bool(found[2] & TERMINATED) == bool(task.terminated[place])
+
+
+def test_probabilities_of_overrides_are_those_that_decisions_then_have():
+    generator = np.random.default_rng(3)
+    session, walker = bumpers_session(), Walker()
+    session.begin(walker.reset())
+    for _ in range(40):
+        found = session.override_probabilities()
+        assert found.shape == (4,)
+        again = session.override_probabilities()  # asking changes nothing
+        assert np.array_equal(found, again)
+        proposed = int(generator.integers(4))
+        decision = session.decide(proposed, Noise(*generator.random(2)))
+        assert decision.probability == found[proposed]
+        session.record(*_as_recorded(walker.step(decision.action)))
+        if session.values_now is None:
+            break
+
+
+def _as_recorded(outcome):
+    state, reward, events = outcome
+    return reward, state, events
+
+
+def test_probabilities_outside_an_episode_are_refused():
+    with pytest.raises(RequestError, match=r"override_probabilities: begin\(state\) must come"):
+        bumpers_session().override_probabilities()

@@ -39,6 +39,7 @@ from qbumpers.values.others import further_values
 from qbumpers.values.tabular import as_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
+_ANY_NOISE = Noise(0.5, 0.5)  # probabilities are those before it is drawn
 _perceive = uncompiled(perceive)
 
 
@@ -146,6 +147,24 @@ class Session:
         self._situation, self._noise = situation, noise
         self.decision = Decision(executed, probability, undone)
         return self.decision
+
+    def override_probabilities(self) -> np.ndarray:
+        """How probably each action would be overridden if it were proposed now.
+
+        Returns:
+            float64 [A], before any coin is tossed.
+
+        Raises:
+            RequestError: outside an episode.
+        """
+        row = self.values_now
+        if row is None:
+            raise RequestError("override_probabilities: begin(state) must come first")
+        found = np.empty(self.model.actions)
+        for action in range(self.model.actions):
+            situation = situate(self.account, self.state, row, self._others_now, action)
+            found[action] = self.assistant.decide(situation, _ANY_NOISE, self._memory).probability
+        return found
 
     def record(self, reward: float, next_state: Any, events: int, notice: float = 0.0) -> Step:
         """The record of the step that was decided, once the action has happened.

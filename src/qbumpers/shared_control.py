@@ -21,6 +21,7 @@ from qbumpers.tasks.identity import task_inside
 from qbumpers.tasks.undoing import reached_limit, undo_of
 from qbumpers.values import QValues, TabularValues, load_values
 from qbumpers.values.fitting import use_in
+from qbumpers.values.offset import OffsetValues
 from qbumpers.values.tabular import as_values
 
 RECORD, SUMMARY = "assistance", "assisted_episode"
@@ -114,9 +115,9 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
     def _values_of_states(self) -> QValues:
         """Values by what a session is given for a state, compared with the environment already."""
         if self._seen is not None:
-            return _FromZero(self.values, 0)
+            return OffsetValues(self.values, 0)
         counts_from_zero = not self._first_state or isinstance(self.values, TabularValues)
-        return self.values if counts_from_zero else _FromZero(self.values, self._first_state)
+        return self.values if counts_from_zero else OffsetValues(self.values, self._first_state)
 
     def _model(self) -> Model:
         """What the rule may know of the environment: more if it is made from a task."""
@@ -256,18 +257,6 @@ class SharedControl(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
             "start_value": account.start_value,
             "projected_return": last.projected_return,
         }
-
-
-class _FromZero:
-    """A function of observations, for a session that counts states from 0."""
-
-    def __init__(self, values: Any, first: int) -> None:
-        self._values, self._first = values, first
-        others = getattr(values, "others", {})
-        self.others = {name: _FromZero(each, first) for name, each in others.items()}
-
-    def __call__(self, state: Any, /) -> Any:
-        return self._values(state + self._first)
 
 
 def _check_names(assistant: Assistant | str, options: Mapping[str, Any]) -> None:

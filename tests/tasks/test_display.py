@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from qbumpers.tasks import TabularEnvironment
+from qbumpers.tasks import TabularEnvironment, make_task
 from qbumpers.tasks.display import Display, unassisted_step
 from qbumpers.tasks.displays.by_environment import display_maker
 from qbumpers.tasks.displays.plain import plain_display
@@ -80,7 +80,7 @@ def test_real_time_displays_have_an_idle_action_and_others_none(name):
 def test_what_makes_a_display_can_be_pickled_and_makes_the_same(name):
     display = display_of(name)
     again = pickle.loads(pickle.dumps(display_maker(environment_of(name))))(None)
-    assert again._replace(scene=display.scene) == display
+    assert again._replace(scene=display.scene, words=display.words) == display
 
 
 def test_an_environment_that_nobody_drew_has_no_display_of_its_own():
@@ -192,3 +192,48 @@ def test_a_plain_display_of_cells_numbers_them_row_by_row():
         for row in range(2)
         for column in range(3)
     }
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_state_is_said_in_a_few_plain_words(name):
+    display, _ = shown(name)
+    said = [display.words(state) for state, _ in walk(name)]
+    assert all(0 < len(words) < 160 and "\n" not in words for words in said)
+    assert len(set(said)) > 1
+
+
+@pytest.mark.parametrize(
+    ("task", "state", "words"),
+    [
+        ("cliff-walking", 36, "row 4 of 4, column 1 of 12, the start"),
+        ("cliff-walking", 47, "row 4 of 4, column 12 of 12, the goal"),
+        ("frozen-lake", 5, "row 2 of 4, column 2 of 4, a hole"),
+        ("inventory", 3, "3 of 9 in stock"),
+        (
+            "lunar-lander",
+            [0.5, 1.25, 0.1, -0.4, -0.1, 0, 0, 0],
+            "height 1.2, to the right of the pad, falling at 0.4, drifting right at 0.1, "
+            "leaning 6 degrees right",
+        ),
+        (
+            "lunar-lander",
+            [0.0, 0.0, -0.2, 0.3, 0.2, 0, 1, 0],
+            "1 of 2 legs on the ground, above the pad, rising at 0.3, drifting left at 0.2, "
+            "leaning 11 degrees left",
+        ),
+        ("mountain-car", [-0.5, 0.01], "car 1.0 left of the flag, rolling right"),
+    ],
+)
+def test_words_say_where_things_are(task, state, words):
+    given = state if isinstance(state, int) else np.array(state, np.float32)
+    assert make_task(task).display.words(given) == words
+
+
+def test_words_of_the_taxi_and_of_the_pole():
+    # ((row 5 + column) 5 + passenger) 4 + destination: in row 1, column 2, riding, to stand Y.
+    assert display_of("Taxi-v4").words(((0 * 5 + 1) * 5 + 4) * 4 + 2) == (
+        "taxi in row 1, column 2; the passenger is in the taxi and wants to go to stand Y"
+    )
+    assert display_of("CartPole-v1").words(np.array([-1.0, 0, 0.1, 0])) == (
+        "cart 1.0 m left of the middle, pole 6 degrees to the right"
+    )

@@ -50,6 +50,14 @@ Scene = Callable[[Any, Step | None], Sequence[Shape]]
 """What changes, drawn over the backdrop: `(state, last step or None) -> shapes`."""
 
 
+def plain_words(state: Any) -> str:
+    """A state in words, if nothing better is known: its number, or its numbers."""
+    numbers = np.asarray(state)
+    if numbers.ndim == 0:
+        return f"state {int(numbers)}"
+    return "observed: " + ", ".join(f"{number:.2f}" for number in numbers.tolist())
+
+
 class Display(NamedTuple):
     """How a task is shown and played; made from the task's arguments, never part of its digest.
 
@@ -62,6 +70,7 @@ class Display(NamedTuple):
         idle: the action while no key is down, of tasks with a rate; -1 if there is none.
         backdrop: what never changes, drawn first.
         scene: what shows the state (number or observation) and the last step.
+        words: says the state, for who does not see the picture.
     """
 
     width: float
@@ -72,6 +81,7 @@ class Display(NamedTuple):
     idle: int
     backdrop: Sequence[Shape]
     scene: Scene
+    words: Callable[[Any], str] = plain_words
 
 
 def polygon(

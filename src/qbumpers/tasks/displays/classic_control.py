@@ -1,7 +1,7 @@
 """CartPole and MountainCar as Gymnasium draws them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from qbumpers.decisions import Step
@@ -45,7 +45,15 @@ def cart_pole_display() -> Display:
             circle(axle, 5, "#8184cb"),
         ]
 
-    return _display(CART_POLE_ACTIONS, 0.0, -1, backdrop, scene)
+    def words(observation: Any) -> str:
+        """Where the cart is, and how the pole leans."""
+        x, angle = float(observation[0]), math.degrees(float(observation[2]))
+        return (
+            f"cart {abs(x):.1f} m {_side(x)} of the middle, pole {abs(angle):.0f} degrees to the "
+            f"{_side(angle)}"
+        )
+
+    return _display(CART_POLE_ACTIONS, 0.0, -1, backdrop, scene, words)
 
 
 def mountain_car_display() -> Display:
@@ -87,16 +95,31 @@ def mountain_car_display() -> Display:
             *(circle(on_car(ahead, 8), 8, _INK, "#c9cac4", 2) for ahead in (-10, 10)),
         ]
 
-    return _display(MOUNTAIN_CAR_ACTIONS, 30.0, 1, backdrop, scene)
+    def words(observation: Any) -> str:
+        """How far the flag is, and where the car goes."""
+        position, velocity = float(observation[0]), float(observation[1])
+        moving = f"rolling {_side(velocity)}" if abs(velocity) > 0.002 else "standing"
+        return f"car {goal - position:.1f} left of the flag, {moving}"
+
+    return _display(MOUNTAIN_CAR_ACTIONS, 30.0, 1, backdrop, scene, words)
+
+
+def _side(number: float) -> str:
+    return "right" if number > 0 else "left"
 
 
 def _display(
-    actions: tuple[str, ...], rate: float, idle: int, backdrop: Sequence[Shape], scene: Scene
+    actions: tuple[str, ...],
+    rate: float,
+    idle: int,
+    backdrop: Sequence[Shape],
+    scene: Scene,
+    words: Callable[[Any], str],
 ) -> Display:
     keys = move_keys(actions)
     if idle >= 0:
         keys |= dict.fromkeys(MOVES["down"], idle)
     return Display(
         width=_WIDTH, height=_HEIGHT, actions=actions, keys=keys, rate=rate,
-        idle=idle, backdrop=backdrop, scene=scene,
+        idle=idle, backdrop=backdrop, scene=scene, words=words,
     )  # fmt: skip

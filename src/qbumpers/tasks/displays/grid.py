@@ -29,6 +29,7 @@ class Look(NamedTuple):
 
 
 _PLAIN = Look("#f7f7f4", "#9a9b95")
+_NAMES = {"S": ", the start", "G": ", the goal", "C": ", the cliff", "H": ", a hole"}
 _LOOKS: Mapping[str, Look] = {
     "S": Look("#dbe7f3", "#2c5f8f"),
     "G": Look("#d9ecd6", "#2f7031"),
@@ -72,9 +73,15 @@ def grid_display(
         row, column = divmod(int(state), columns)
         return [circle(_centre(row, column), 0.27 * CELL, "#e8890c", "#8a4d00", _LINE)]
 
+    def words(state: Any) -> str:
+        """Row and column, counted from the upper left, and what is there."""
+        row, column = divmod(int(state), columns)
+        there = _NAMES.get(cells[row][column], "")
+        return f"row {row + 1} of {len(cells)}, column {column + 1} of {columns}{there}"
+
     return Display(
         width=columns * CELL, height=len(cells) * CELL, actions=actions, keys=keys, rate=0.0,
-        idle=-1, backdrop=backdrop, scene=scene,
+        idle=-1, backdrop=backdrop, scene=scene, words=words,
     )  # fmt: skip
 
 

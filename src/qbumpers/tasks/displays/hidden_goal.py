@@ -31,4 +31,9 @@ def hidden_goal_display() -> Display:
         letter = text(centre, "G", "#2f7031", 0.45 * CELL)
         return [ring, letter, *plain.scene(cell, step)]
 
-    return plain._replace(scene=scene)
+    def words(state: int) -> str:
+        """The cell, and which goal it is."""
+        cell, goal = divmod(int(state), len(GOALS))
+        return f"{plain.words(cell)}; your goal is in row 1, column {GOALS[goal] + 1}"
+
+    return plain._replace(scene=scene, words=words)

@@ -26,7 +26,7 @@ def inventory_display() -> Display:
     paper = rectangle((0, 0), (_WIDTH, _HEIGHT), "#f7f7f4")
     return Display(
         width=_WIDTH, height=_HEIGHT, actions=actions, keys=keys, rate=0.0, idle=-1,
-        backdrop=[paper, shelf, *places], scene=_scene,
+        backdrop=[paper, shelf, *places], scene=_scene, words=_words,
     )  # fmt: skip
 
 
@@ -44,6 +44,10 @@ def _scene(state: Any, step: Step | None) -> list[Shape]:
     sold = min(before + ordered, CAPACITY) - stock
     words = f"ordered {ordered}, sold {sold}, earned {float(step.reward):g}"
     return [title, *items, text((_WIDTH / 2, 176), words, _QUIET, 22)]
+
+
+def _words(state: Any) -> str:
+    return f"{int(state)} of {CAPACITY} in stock"
 
 
 def _corner(place: int) -> tuple[float, float]:

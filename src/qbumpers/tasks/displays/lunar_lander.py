@@ -34,7 +34,8 @@ _KEYS = {
     "ArrowDown": 0, "KeyS": 0,
 }  # fmt: skip
 _ACROSS, _UP = WIDTH * SCALE, HEIGHT * SCALE  # 600 x 400
-_LEG_ANGLES = np.linspace(0.348, 0.9, 13)  # to the hull, radians: held by its motor, to its limit
+# To the hull, radians: held by its motor, to its limit.
+_LEG_ANGLES = np.linspace(0.348, 0.9, 13).tolist()
 _EDGE = "#4d4d80"
 _STARS = 70
 
@@ -61,6 +62,7 @@ def lunar_lander_display(seed: int | None = None) -> Display:
         width=_ACROSS, height=_UP, actions=ACTIONS, keys=_KEYS, rate=RATE, idle=0,
         backdrop=[*_sky(), *_ground(surface), *_pad()],
         scene=functools.partial(_scene, np.array(surface)),
+        words=_words,
     )  # fmt: skip
 
 
@@ -104,6 +106,20 @@ def _pad() -> list[Shape]:
         cloth = [(x, top - 50), (x, top - 38), (x + 25, top - 44)]
         shapes += [line([(x, top), (x, top - 51)], "#ffffff", 1.5), polygon(cloth, "#cccc00")]
     return shapes
+
+
+def _words(observation: Any) -> str:
+    """Where the lander is, how it moves and how it leans."""
+    x, y, across, down, angle = (float(number) for number in observation[:5])
+    place = "above the pad" if abs(x) < 0.2 else f"to the {'right' if x > 0 else 'left'} of the pad"
+    legs = int(observation[LEFT_LEG]) + int(observation[RIGHT_LEG])
+    touching = f"{legs} of 2 legs on the ground" if legs else f"height {max(y, 0):.1f}"
+    drift = "left" if across < 0 else "right"
+    lean = "right" if angle < 0 else "left"
+    return (
+        f"{touching}, {place}, {'falling' if down < 0 else 'rising'} at {abs(down):.1f}, drifting "
+        f"{drift} at {abs(across):.1f}, leaning {abs(math.degrees(angle)):.0f} degrees {lean}"
+    )
 
 
 def _scene(surface: np.ndarray, observation: Any, step: Step | None) -> list[Shape]:
@@ -159,9 +175,11 @@ def _leg(surface: np.ndarray, placed: Placed, side: int, touches: bool) -> list[
 def _spread(surface: np.ndarray, placed: Placed, side: int) -> float:
     """The angle of a leg to the hull, radians: the smallest that keeps its end above the ground."""
     end = 0, -LEG_HALF_HEIGHT * SCALE
-    ends = np.array(placed(_beside_leg(side, angle, end) for angle in _LEG_ANGLES))
-    above = ends[:, 1] <= np.interp(ends[:, 0], surface[:, 0], surface[:, 1])
-    return _LEG_ANGLES[np.argmax(above) if above.any() else -1]
+    for angle in _LEG_ANGLES:  # mostly it is the first one
+        [(x, y)] = placed([_beside_leg(side, angle, end)])
+        if y <= np.interp(x, surface[:, 0], surface[:, 1]):
+            return angle
+    return _LEG_ANGLES[-1]
 
 
 def _beside_leg(side: int, angle: float, point: Point) -> tuple[float, float]:

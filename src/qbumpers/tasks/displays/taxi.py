@@ -55,9 +55,19 @@ def taxi_display(desc: Sequence[str]) -> Display:
             *([] if riding else _person(stands[passenger])),
         ]
 
+    def words(state: Any) -> str:
+        """Where the taxi is, where the passenger is, and where they want to go."""
+        places = np.unravel_index(int(state), (rows, columns, len(STANDS) + 1, len(STANDS)))
+        row, column, passenger, destination = (int(place) for place in places)
+        where = "in the taxi" if passenger == len(STANDS) else f"at stand {STANDS[passenger]}"
+        return (
+            f"taxi in row {row + 1}, column {column + 1}; the passenger is {where} and wants to go "
+            f"to stand {STANDS[destination]}"
+        )
+
     return Display(
         width=width, height=height, actions=ACTIONS, keys={**move_keys(ACTIONS), **_KEYS},
-        rate=0.0, idle=-1, backdrop=_town(desc, cells, width, height), scene=scene,
+        rate=0.0, idle=-1, backdrop=_town(desc, cells, width, height), scene=scene, words=words,
     )  # fmt: skip
 
 

@@ -1,0 +1,110 @@
+"""Deciding recorded sessions again."""
+
+import itertools
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from qbumpers.assistants import make_assistant
+from qbumpers.decisions import Step
+from qbumpers.errors import RequestError
+from qbumpers.session import ReplayError, replay
+from qbumpers.study.game import Played
+from qbumpers.study.setup import Setup, setup_of
+from qbumpers.study.stepping import chance_of
+from qbumpers.study.tables import Recorded, open_records, read_session, sessions_in
+from qbumpers.tasks.dynamics import LIMIT
+
+
+class Replayed(NamedTuple):
+    """What became of a recorded session.
+
+    Attributes:
+        session: identifier.
+        task: name of the task.
+        episodes: recorded.
+        steps: that were decided and done again.
+        difference: the first thing that came out differently, in words; empty if nothing did.
+    """
+
+    session: str
+    task: str
+    episodes: int
+    steps: int
+    difference: str
+
+
+def replay_file(path: str | Path) -> list[Replayed]:
+    """Hold rule and task to every session of a records file.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        RequestError: if it is no records file.
+    """
+    if not Path(path).is_file():
+        raise RequestError(f"records file {path}: there is none")
+    engine = open_records(path)
+    found = (read_session(engine, session) for session in sessions_in(engine))
+    results = [replay_session(recorded) for recorded in found if recorded is not None]
+    engine.dispose()
+    return results
+
+
+def replay_session(recorded: Recorded) -> Replayed:
+    """Hold rule and task to a recorded session; an episode that has not ended is held so far.
+
+    Args:
+        recorded: the session.
+    """
+    steps = sum(len(played.steps) for played in recorded.played)
+    about = (recorded.session, str(recorded.setup.get("task")), len(recorded.played), steps)
+    try:
+        setup = setup_of(recorded.setup)
+        difference = setup.difference(recorded.setup)
+        if not difference:
+            _replay(setup, recorded)
+    except ReplayError as error:
+        difference = str(error).removeprefix("replay: ")
+    except RequestError as error:
+        difference = str(error)
+    return Replayed(*about, difference)
+
+
+def _replay(setup: Setup, recorded: Recorded) -> None:
+    """Decide every episode again, each assistant's in a session of its own."""
+    numbered = [(n, played) for n, played in enumerate(recorded.played) if played.steps]
+    numbered.sort(key=lambda each: each[1].choice.key)
+    for _, group in itertools.groupby(numbered, key=lambda each: each[1].choice.key):
+        episodes = list(group)
+        name, options = episodes[0][1].choice.acting
+        session = setup.session(make_assistant(name, **options))
+        log = [step for _, played in episodes for step in _ended(played)]
+        replay(session, _Again(setup, recorded.seed, [n for n, _ in episodes]), log)
+
+
+def _ended(played: Played) -> list[Step]:
+    """The steps of an episode; one that has not ended is cut as if at its limit."""
+    last = played.steps[-1]
+    return [*played.steps[:-1], last._replace(events=int(last.events) | LIMIT)]
+
+
+class _Again:
+    """The task once more, for `replay`: the recorded episodes with their chances."""
+
+    def __init__(self, setup: Setup, seed: int, numbers: list[int]) -> None:
+        self._setup, self._stepper = setup, setup.make_stepper()
+        self._chances = iter([chance_of(seed, number) for number in numbers])
+
+    def reset(self) -> Any:
+        return self._setup.seen(self._stepper.reset(next(self._chances)))
+
+    def step(self, action: int) -> tuple[Any, float, int]:
+        state, reward, events = self._stepper.step(action)
+        return self._setup.seen(state), reward, events
+
+    def snapshot(self) -> Any:
+        return self._stepper.snapshot()
+
+    def restore(self, snapshot: Any) -> None:
+        self._stepper.restore(snapshot)

@@ -1,0 +1,219 @@
+"""The server: its page, its socket, and the sessions that are being played."""
+
+import asyncio
+import contextlib
+import logging
+import secrets
+import time
+from collections.abc import AsyncGenerator, Collection
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sql
+from itsdangerous import BadSignature, URLSafeSerializer
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+import qbumpers
+from qbumpers.errors import RequestError
+from qbumpers.study.connection import (
+    TOO_MUCH,
+    UNKNOWN_SESSION,
+    WRONG,
+    Connection,
+    GoneError,
+    TooMuchError,
+)
+from qbumpers.study.game import Choice, Game, resumed
+from qbumpers.study.guarding import Guard
+from qbumpers.study.messages import Hello
+from qbumpers.study.offers import offers
+from qbumpers.study.player import Player
+from qbumpers.study.setup import Setup
+from qbumpers.study.tables import SESSIONS, read_session, secret_of
+from qbumpers.study.views import task_view
+from qbumpers.study.writing import Writer
+
+STATIC = Path(__file__).with_name("static")
+"""The folder of the page."""
+
+MOST_CONNECTIONS = 200
+"""Pages at once."""
+
+_GREETING = 5.0  # seconds within which a page must greet
+_LOGGER = logging.getLogger("qbumpers.study")
+
+
+class UnknownSessionError(RequestError):
+    """A token of no session that can go on here."""
+
+
+class Sessions:
+    """The sessions that are being played, and those of the record.
+
+    Args:
+        setup: what is played.
+        choice: who assists unless the participant chooses.
+        engine: of the records.
+        second: how long a second of the countdown takes.
+    """
+
+    def __init__(
+        self, setup: Setup, choice: Choice, engine: sql.Engine, second: float = 1.0
+    ) -> None:
+        self._setup, self._engine, self._second = setup, engine, second
+        self._writer = Writer(engine)
+        self._signer = URLSafeSerializer(secret_of(engine), salt="session")
+        self._players: dict[str, Player] = {}
+        self._finding = asyncio.Lock()
+        self.open = 0
+        self._facts: dict[str, Any] = {
+            "task": task_view(setup),
+            "offers": offers(setup),
+            "choice": {
+                "assistant": choice.name,
+                "options": dict(choice.options),
+                "assisted": choice.assisted,
+            },
+        }
+
+    async def join(self, connection: Connection, hello: Hello) -> Player:
+        """The session of a page that has greeted; it is that page's from now on.
+
+        Raises:
+            UnknownSessionError: if there is no such session, or it cannot go on.
+        """
+        async with self._finding:
+            player = await self._player(hello.token)
+            await player.take_over(connection)
+            return player
+
+    async def welcome(self, player: Player, connection: Connection, hello: Hello) -> None:
+        """Show a page where its session is."""
+        token = self._signer.dumps(player.session)
+        await player.welcome(connection, hello, {**self._facts, "token": token})
+
+    async def leave(self, player: Player, connection: Connection) -> None:
+        """A page has gone; a session without one is forgotten, since the record has it all."""
+        with contextlib.suppress(GoneError):
+            if await player.leave(connection) and self._players.get(player.session) is player:
+                del self._players[player.session]
+
+    def close(self) -> None:
+        """Write what is waiting."""
+        self._writer.close()
+
+    async def _player(self, token: str) -> Player:
+        if not token:
+            return await self._new()
+        try:
+            session = str(self._signer.loads(token))
+        except BadSignature:
+            raise UnknownSessionError("this server knows no such session") from None
+        playing = self._players.get(session)
+        if playing is not None and not playing.lost:
+            return playing
+        return self._add(session, await asyncio.to_thread(self._recorded, session))
+
+    async def _new(self) -> Player:
+        session, seed = secrets.token_urlsafe(16), secrets.randbits(63)
+        row = {
+            "session": session,
+            "began": time.time(),
+            "seed": str(seed),
+            "setup": self._setup.described(),
+            "version": qbumpers.__version__,
+        }
+        await asyncio.wrap_future(self._writer.add([(SESSIONS, row)]))
+        return self._add(session, Game(self._setup, seed))
+
+    def _recorded(self, session: str) -> Game:
+        recorded = read_session(self._engine, session)
+        if recorded is None:
+            raise UnknownSessionError("this server knows no such session")
+        difference = self._setup.difference(recorded.setup)
+        if difference:
+            raise UnknownSessionError(f"the session before cannot go on: {difference}")
+        try:
+            return resumed(self._setup, recorded.seed, recorded.played)
+        except RequestError as error:
+            raise UnknownSessionError(f"the session before cannot go on: {error}") from error
+
+    def _add(self, session: str, game: Game) -> Player:
+        self._players[session] = Player(session, game, self._writer, self._second)
+        return self._players[session]
+
+
+async def _converse(sessions: Sessions, connection: Connection) -> None:
+    """Everything that a page says, until it goes."""
+    player: Player | None = None
+    try:
+        async with asyncio.timeout(_GREETING):
+            hello = await connection.receive()
+        if not isinstance(hello, Hello):
+            raise RequestError("the first message of a page is hello")
+        player = await sessions.join(connection, hello)
+        await sessions.welcome(player, connection, hello)
+        while True:
+            try:
+                await player.handle(await connection.receive())
+            except TooMuchError:
+                raise
+            except RequestError as error:
+                await connection.send("problem", message=str(error))
+    except GoneError:
+        pass
+    except TimeoutError:
+        await connection.close(WRONG, f"no hello within {_GREETING:.0f} seconds")
+    except UnknownSessionError as error:
+        await connection.close(UNKNOWN_SESSION, str(error))
+    except TooMuchError as error:
+        await connection.close(TOO_MUCH, str(error))
+    except RequestError as error:
+        await connection.close(WRONG, str(error))
+    except Exception:
+        _LOGGER.exception("a session failed")
+        await connection.close(1011, "the server failed; what happened before is kept")
+    finally:
+        if player is not None:
+            await sessions.leave(player, connection)
+
+
+def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
+    """The server as an ASGI application.
+
+    Args:
+        sessions: that are played on it; closed when it ends.
+        hosts: names with ports by which pages may address it.
+    """
+
+    async def page(_: Request) -> FileResponse:
+        return FileResponse(STATIC / "index.html")
+
+    async def socket(websocket: WebSocket) -> None:
+        await websocket.accept()
+        connection = Connection(websocket)
+        if sessions.open >= MOST_CONNECTIONS:
+            await connection.close(TOO_MUCH, "too many pages are open")
+            return
+        sessions.open += 1
+        try:
+            await _converse(sessions, connection)
+        finally:
+            sessions.open -= 1
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
+        yield
+        await asyncio.to_thread(sessions.close)
+
+    routes = [
+        Route("/", page),
+        WebSocketRoute("/socket", socket),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    return Guard(Starlette(routes=routes, lifespan=lifespan), hosts)
