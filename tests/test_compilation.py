@@ -108,6 +108,7 @@ def nowhere(package, tmp_path):
     return {name: str(blocked / "home") for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA")}
 
 
+@pytest.mark.slow
 def test_without_a_folder_for_the_cache_functions_are_compiled_every_time(package, tmp_path):
     environment = nowhere(package, tmp_path)
     for _ in range(2):
@@ -118,6 +119,7 @@ def test_without_a_folder_for_the_cache_functions_are_compiled_every_time(packag
     assert list(tmp_path.rglob("*.nb?")) == []
 
 
+@pytest.mark.slow
 def test_on_a_full_disk_functions_are_compiled_with_one_warning(package):
     found, said = run(package, FULL_DISK)
     assert found == (1, 1, 0)

@@ -22,6 +22,7 @@ def estimated(seed, steps):
     return TabularTask.estimated(environment, discount=0.9, steps=steps, seed=seed)
 
 
+@pytest.mark.slow
 def test_the_interval_holds_the_true_value_at_its_rate():
     truth = float(TRUE.start @ solve(TRUE).table.max(axis=1))
     found = [start_interval(estimated(seed, 1_500)) for seed in range(TRIES)]
