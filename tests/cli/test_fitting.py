@@ -50,4 +50,11 @@ def test_a_wrong_request_is_one_line(call, steps, arguments, message):
 def test_a_file_that_is_not_there_is_one_line(call, tmp_path):
     status, _, error = call("fit", tmp_path / "none.parquet")
     assert status == 2
+    assert "there is no such file" in words(error)
+
+
+def test_a_file_of_another_kind_is_one_line(call, tmp_path):
+    (tmp_path / "steps.parquet").write_text("step,reward")
+    status, _, error = call("fit", tmp_path / "steps.parquet")
+    assert status == 2
     assert "not a readable Parquet file" in words(error)

@@ -63,6 +63,8 @@ def load_steps(source: str | Path) -> dict[str, Step]:
 
 
 def _from_parquet(path: Path) -> dict[str, Step]:
+    if not path.is_file():
+        raise RequestError(f"steps = {str(path)!r}: there is no such file")
     try:
         table = pl.read_parquet(path)
     except (OSError, pl.exceptions.PolarsError) as error:
