@@ -17,7 +17,8 @@ from tests.experiments.examples import PLAIN, cells_of, contents_of, write_toml
 from tests.processes import ENVIRONMENT, call, finish, start
 
 
-@pytest.mark.parametrize("profile", ["figures", pytest.param("text", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", ["figures", "text"])
 def test_the_paper_is_reproduced_with_a_report(tmp_path, profile):
     arguments = ["reproduce", "cliff-walking", "--profile", profile, "--trials", 2]
     status, output, errors = call(*arguments, "--workers", 2, "--out", tmp_path / "out")

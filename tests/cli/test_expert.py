@@ -96,6 +96,7 @@ def test_a_file_is_checked_and_drawn(call, pole, tmp_path):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_values_are_corrected_into_another_file(call, pole, monkeypatch):
     monkeypatch.setattr(visiting, "_EPISODES", 10)
     monkeypatch.setattr(correcting, "_UPDATES", 300)

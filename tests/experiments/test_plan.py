@@ -13,6 +13,7 @@ from tests.experiments.examples import cart, settings
 from tests.values.networks import constant
 
 
+@pytest.mark.slow
 def test_values_no_better_than_random_play_are_warned_of_once_per_run(tmp_path):
     constant(0, 4, 2, task="CartPole-v1").save(tmp_path / "fall.npz")
     changes = {"values": str(tmp_path / "fall.npz"), "trials": 1, "episodes": 1}

@@ -96,6 +96,7 @@ def test_its_report_is_written(made):
     assert mine.filter(condition=ids[0])["assisted_mean"].item() == pytest.approx(mean)
 
 
+@pytest.mark.slow
 def test_the_command_reports_it(made):
     done = subprocess.run(
         [sys.executable, "-m", "qbumpers", "report", made[0]],

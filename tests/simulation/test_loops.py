@@ -121,12 +121,17 @@ CONDITIONS = {
 }
 SEED, TRIALS = 11, range(2, 5)
 # What a perception does is one table; two of them stand for all where a step is taken back. Of
-# forgetting it is tables of other widths that matter, those of the actor-critic and of the model.
+# forgetting it is tables of other widths that matter, those of the model.
 LONGER = {
     *(f"cliff, taken back, {name}" for name in [*PERCEPTIONS][1:-1]),
     "random world, softmax, by a power law",
     "random world, imitator, forgetting",
     "random world, two rates, forgetting",
+    "random world, actor-critic, by a power law",
+    "random world, sarsa, common",
+    "random world, expected sarsa",
+    "random world, slip",
+    "cliff, taken back, sarsa, sometimes",
 }
 
 
