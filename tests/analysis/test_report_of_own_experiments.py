@@ -7,7 +7,6 @@ import shutil
 import polars as pl
 import pytest
 
-from qbumpers.analysis import report
 from qbumpers.analysis.additions import Additions
 from qbumpers.analysis.report import write_report
 from qbumpers.files import StoreError
@@ -132,18 +131,6 @@ def test_a_report_needs_its_own_files_alone_and_comes_out_the_same(plain, tmp_pa
     assert parts[-1] == "report.html"
     assert findings.summary.height == 3
     assert (findings.regrets, findings.methods, findings.additions) == ({}, None, Additions())
-
-
-def test_figures_drawn_by_several_processes_are_those_drawn_by_one(plain, tmp_path, monkeypatch):
-    folder = tmp_path / "out"
-    shutil.copytree(plain, folder)
-    shutil.rmtree(folder / "figures")
-    monkeypatch.setattr(report, "_MANY_CONDITIONS", 1)
-    monkeypatch.setattr(report, "usable_cores", lambda: 2)
-    parts = []
-    write_report(folder, advance=parts.append)
-    assert contents_of(folder, "*.*", "figures/*") == contents_of(plain, "*.*", "figures/*")
-    assert parts[-1] == "report.html"
 
 
 def test_a_full_disk_leaves_the_old_report_whole(plain, tmp_path, monkeypatch):

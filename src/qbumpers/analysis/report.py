@@ -3,9 +3,7 @@
 import contextlib
 import gc
 import io
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from concurrent.futures import Executor
-from functools import partial
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +21,8 @@ from qbumpers.analysis.page.elements import Drawing
 from qbumpers.analysis.page.headlines import headlines
 from qbumpers.analysis.page.layout import Picture, page
 from qbumpers.analysis.page.suggestions import suggestions
-from qbumpers.cores import usable_cores
 from qbumpers.experiments.store import Results, load
 from qbumpers.files import clear_left, write_atomically
-from qbumpers.processes import process_pool, submit_unheard
 
 REPORT, SUMMARY, TRIALS = "report.html", "summary.csv", "trials.parquet"
 """The page; a row per condition; a row per trial."""
@@ -41,7 +37,6 @@ METHODS, ADVANTAGES, DIFFERENCES, REGRET = (
 
 FIGURES = "figures"
 _OPTIONAL = (METHODS, ADVANTAGES, DIFFERENCES, REGRET)
-_ARTISTS, _MANY_CONDITIONS = 4, 16
 _FIGURE_FILES = (".png", ".svg", ".csv")
 
 
@@ -80,16 +75,15 @@ def write_report(
     folder = Path(folder)
     results = load(folder, unfinished=True)
     advance("tables")
-    with _artists(len(results.conditions)) as artists:
-        findings = find(results, add)
-        tables = _tables(findings)
-        for name, table in tables.items():
-            _write(folder / name, table.write_csv().encode())
-        _write(folder / TRIALS, _parquet(findings.trials))
-        pictures = []
-        for name, drawn in _pictures(folder / FIGURES, drawings(results, findings), artists):
-            advance(f"figure {name}")
-            pictures.append(drawn())
+    findings = find(results, add)
+    tables = _tables(findings)
+    for name, table in tables.items():
+        _write(folder / name, table.write_csv().encode())
+    _write(folder / TRIALS, _parquet(findings.trials))
+    pictures = []
+    for drawing in drawings(results, findings):
+        advance(f"figure {drawing.name}")
+        pictures.append(picture(folder / FIGURES, drawing))
     advance(REPORT)
     text = page(folder, results, findings, pictures, tables)
     _write(folder / REPORT, text.encode())
@@ -158,30 +152,6 @@ def _flat(about: LearnerFindings, matched: str, regret: Regret) -> dict[str, Any
         },
         **{f"gap_{part}": number for part, number in regret.gap._asdict().items()},
     }
-
-
-@contextlib.contextmanager
-def _artists(conditions: int) -> Iterator[Executor | None]:
-    """Processes that draw while others draw; None if drawing takes no longer than beginning them.
-
-    They load Matplotlib while this process makes the tables.
-    """
-    workers = min(usable_cores(), _ARTISTS)
-    if conditions < _MANY_CONDITIONS or workers == 1:
-        yield None
-        return
-    with process_pool(workers, "qbumpers.analysis.page.drawings") as executor:
-        submit_unheard(executor, int)
-        yield executor
-
-
-def _pictures(
-    folder: Path, drawings: Sequence[Drawing], artists: Executor | None
-) -> list[tuple[str, Callable[[], Picture]]]:
-    """The name of each figure, and what waits until it is drawn or draws it."""
-    if artists is None:
-        return [(each.name, partial(picture, folder, each)) for each in drawings]
-    return [(each.name, submit_unheard(artists, picture, folder, each).result) for each in drawings]
 
 
 def picture(folder: Path, drawing: Drawing) -> Picture:
