@@ -8,7 +8,7 @@ and of these the one with the smallest distance d(a, a^h) is executed. `local-q-
 the same set, but replaces what is outside of it by the best action.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -53,8 +53,8 @@ class ClosestAcceptableOptions(NamedTuple):
 
 
 @compiled
-def distances(options: ClosestAcceptableOptions, model: Model) -> np.ndarray:
-    """The distance between actions, float64 [A, A]."""
+def distances(options: Any, model: Model) -> np.ndarray:
+    """The distance between actions, float64 [A, A]; all alike if the task states none."""
     return model.distance.copy()
 
 

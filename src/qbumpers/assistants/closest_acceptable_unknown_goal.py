@@ -14,10 +14,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.assistants.closest_acceptable import nearest_acceptable
+from qbumpers.assistants.closest_acceptable import distances, nearest_acceptable
 from qbumpers.assistants.registry import register_assistant, unchanged
 from qbumpers.compilation import compiled
-from qbumpers.decisions import Decision, Model, Noise, Situation
+from qbumpers.decisions import Decision, Noise, Situation
 
 
 class ClosestAcceptableUnknownGoalOptions(NamedTuple):
@@ -29,12 +29,6 @@ class ClosestAcceptableUnknownGoalOptions(NamedTuple):
     """
 
     alpha: Annotated[float, Field(ge=0, le=1)]
-
-
-@compiled
-def distances(options: ClosestAcceptableUnknownGoalOptions, model: Model) -> np.ndarray:
-    """The distance between actions, float64 [A, A]; all alike if the task states none."""
-    return model.distance.copy()
 
 
 @register_assistant(

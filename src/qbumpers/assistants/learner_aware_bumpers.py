@@ -163,11 +163,11 @@ def is_lesson(
     """Whether a mistake teaches more than it costs.
 
     Args:
-        situation: of the proposal.
+        situation: in which the mistake is proposed.
         action: the override in its place.
         alpha: of the rule's options.
         loss: what an episode may lose, in reward units.
-        mirrors: of the learner.
+        mirrors: what the learner may believe.
         shares: float64 [K], their probabilities.
         outlook: where the actions lead.
     """
@@ -191,11 +191,11 @@ def weighed(
     """The decision about a proposal that is not best.
 
     Args:
-        situation: of the proposal.
+        situation: in which it is proposed.
         noise: decides whether a trifle passes, and among equal actions.
         alpha: of the rule's options.
         v_min: of the rule's options, in reward units.
-        mirrors: of the learner.
+        mirrors: what the learner may believe.
         outlook: where the actions lead.
     """
     proposed, loss = situation.proposed, situation.start_value - v_min

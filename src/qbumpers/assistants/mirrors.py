@@ -109,7 +109,7 @@ def _choices(mirrors: Mirrors, state: int, action: int, loss: float) -> np.ndarr
     """Probability that each mirror means an action, float64 [B, K], by temperature.
 
     Args:
-        mirrors: of the learner.
+        mirrors: what the learner may believe.
         state: where it chooses.
         action: what it chooses.
         loss: what an episode may lose, in reward units; temperatures are shares of it.

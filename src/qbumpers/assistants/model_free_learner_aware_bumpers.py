@@ -100,7 +100,7 @@ def recalled(memory: Experience, state: int, values: np.ndarray) -> Outlook:
     """Where actions led, by what is remembered of them.
 
     Args:
-        memory: of the assistant.
+        memory: outcomes that the assistant has seen.
         state: where the actions are.
         values: float64 [A], Q*(s, .).
     """

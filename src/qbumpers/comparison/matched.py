@@ -16,7 +16,7 @@ def at_share(points: np.ndarray, share: float) -> np.ndarray:
     Args:
         points: means of each of K settings, float64 [..., K, 3]: share, assisted and unassisted
             return.
-        share: of the steps.
+        share: of steps to be overridden, in [0, 1].
 
     Returns:
         Assisted and unassisted return, float64 [..., 2]; NaN if no setting overrides as little, or

@@ -261,7 +261,7 @@ def unsuited(name: str, scales: Scales) -> str:
 
     Args:
         name: one of `METHODS`.
-        scales: of the task.
+        scales: what the task's settings are measured in.
 
     Returns:
         A reason in words.

@@ -71,7 +71,7 @@ def find_tables(comparison: Comparison, seed: int = 0) -> Tables:
 
     Args:
         comparison: from `load_comparison`.
-        seed: of the resamples.
+        seed: decides which trials are resampled.
     """
     generator = np.random.default_rng(seed)
     cases, names = comparison.cases, comparison.names

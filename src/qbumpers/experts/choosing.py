@@ -55,7 +55,7 @@ def check_claim(task: Task, judgement: Judgement) -> bool:
 
     Args:
         task: what was played.
-        judgement: of the values.
+        judgement: what the values promised and achieved.
 
     Returns:
         Whether V(s_0) is within three standard errors of the discounted return, or within a fifth

@@ -148,7 +148,7 @@ class Likelihood:
 
     Args:
         candidate: the learner.
-        choices: of the participant.
+        choices: what the participant proposed, and what followed.
         shape: of what is learned.
         training: episodes over which schedules are counted.
         particles: simulated learners, if something is hidden.

@@ -271,7 +271,7 @@ def compare(scores: pl.DataFrame, seed: int = 0) -> pl.DataFrame:
 
     Args:
         scores: a row per participant and model, as `fit` makes them.
-        seed: of the bootstrap.
+        seed: decides which participants are resampled.
 
     Returns:
         A row per model; `fit` says which columns. Where a model could not be, for one participant

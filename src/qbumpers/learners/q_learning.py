@@ -1,6 +1,6 @@
 """Tabular Q-learning with epsilon-greedy exploration and the paper's schedules (Section 4.2)."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -83,14 +83,28 @@ def q_update(old: float, reward: float, next_value: float, learning_rate: float)
 
 
 @compiled
+def best_future(memory: Any, transition: Transition, discount: float) -> float:
+    """Discounted value of the best action where a step led; 0 after an end.
+
+    Args:
+        memory: with action values, `values` float64 [S, A] and their `width`, as in `Shape`.
+        transition: the step.
+        discount: gamma of the learner's own values.
+
+    Returns:
+        The value, in reward units.
+    """
+    if transition.terminated:
+        return 0.0
+    return discount * best_value(row(memory.values, transition.next_state, memory.width))
+
+
+@compiled
 def learn(
     settings: QLearner, memory: Table, transition: Transition, rates: Rates, stream: np.ndarray
 ) -> None:
     """Move the credited action towards its reward and the best value of where it led."""
-    future = 0.0
-    if not transition.terminated:
-        following = row(memory.values, transition.next_state, memory.width)
-        future = settings.discount * best_value(following)
+    future = best_future(memory, transition, settings.discount)
     values = row(memory.values, transition.state, memory.width)
     values[transition.action] = q_update(
         values[transition.action], transition.reward, future, rates.learning_rate

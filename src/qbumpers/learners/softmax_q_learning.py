@@ -23,11 +23,10 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.borrowing import row
-from qbumpers.choice import best_value
 from qbumpers.compilation import compiled
 from qbumpers.learners import q_learning
 from qbumpers.learners.interface import Rates, Shape, Transition
-from qbumpers.learners.q_learning import q_update
+from qbumpers.learners.q_learning import best_future, q_update
 from qbumpers.learners.registry import register_learner
 from qbumpers.learners.schedules import Schedule, scheduled
 from qbumpers.learners.softmax import by_weight, normalise, softmax_weights
@@ -118,10 +117,7 @@ def learn(
     stream: np.ndarray,
 ) -> None:  # fmt: skip
     """Move the credited action as Q-learning does, and let the others of its state decay."""
-    future = 0.0
-    if not transition.terminated:
-        following = row(memory.values, transition.next_state, memory.width)
-        future = settings.discount * best_value(following)
+    future = best_future(memory, transition, settings.discount)
     values = row(memory.values, transition.state, memory.width)
     for action in range(len(values)):
         if action == transition.action:

@@ -27,10 +27,10 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.borrowing import row
-from qbumpers.choice import best_value
 from qbumpers.compilation import compiled
 from qbumpers.learners import q_learning
 from qbumpers.learners.interface import Rates, Shape, Transition
+from qbumpers.learners.q_learning import best_future
 from qbumpers.learners.registry import register_learner
 from qbumpers.learners.schedules import Schedule, scheduled
 
@@ -90,10 +90,7 @@ def learn(
     stream: np.ndarray,
 ) -> None:  # fmt: skip
     """Let both parts of the credited action forget a little, and learn from the error."""
-    future = 0.0
-    if not transition.terminated:
-        following = row(memory.values, transition.next_state, memory.width)
-        future = settings.discount * best_value(following)
+    future = best_future(memory, transition, settings.discount)
     values = row(memory.values, transition.state, memory.width)
     fast = row(memory.fast, transition.state, memory.width)
     slow = row(memory.slow, transition.state, memory.width)

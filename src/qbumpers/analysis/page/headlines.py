@@ -55,26 +55,19 @@ def _about(about: LearnerFindings) -> Iterator[str]:
 
 def _leads(about: LearnerFindings, measure: str, leader: Leader) -> str:
     """Which condition is best in a measure, and how sure that is."""
-    if leader.contenders is not None and len(leader.contenders) == leader.others > 1:
-        return _open(about, measure, leader)
     row = about.summary.row(by_predicate=pl.col("condition") == leader.condition, named=True)
+    returned = f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode."
+    if leader.contenders is not None and len(leader.contenders) == leader.others > 1:
+        return (
+            f"Which condition {_VERBS[measure]} best cannot be told from {leader.trials} learners "
+            f"per condition: each of {leader.others} others may be as good (95% for all at once) "
+            f"as {readable(leader.condition)}, whose learners return the most, {returned}"
+        )
     idle = row["overrides_mean"] == 0 and row["assistant"] != "none"
     which = ", which never overrode," * idle
     return (
         f"{readable(leader.condition)}{which} {_VERBS[measure]} best: its learners return "
-        f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode. "
-        f"{_how_sure(leader, 'condition that overrides' if idle else 'other condition')}"
-    )
-
-
-def _open(about: LearnerFindings, measure: str, leader: Leader) -> str:
-    """That every other condition may be as good as the one of the best mean."""
-    row = about.summary.row(by_predicate=pl.col("condition") == leader.condition, named=True)
-    return (
-        f"Which condition {_VERBS[measure]} best cannot be told from {leader.trials} learners per "
-        f"condition: each of {leader.others} others may be as good (95% for all at once) as "
-        f"{readable(leader.condition)}, whose learners return the most, "
-        f"{_interval(row, measure, about.decimals)} per {_EPISODES[measure]} episode."
+        f"{returned} {_how_sure(leader, 'condition that overrides' if idle else 'other condition')}"
     )
 
 
