@@ -35,7 +35,7 @@ from qbumpers.tasks.dynamics import LIMIT, TERMINATED, TRUNCATED
 from qbumpers.tasks.identity import transitions_digest
 from qbumpers.values import QValues, check_width
 from qbumpers.values.fitting import Use
-from qbumpers.values.others import further_values
+from qbumpers.values.others import all_further_values
 from qbumpers.values.tabular import as_values
 
 _ENDS = TERMINATED | TRUNCATED | LIMIT
@@ -90,11 +90,8 @@ class Session:
             )
         found = perception(perceived) if isinstance(perceived, str) else perceived
         self.perception = as_numbers(found)
-        self._others = [
-            row
-            for name in assistant.values
-            for row in further_values(self.values, name, assistant.name, model.actions).values()
-        ]
+        further = all_further_values(self.values, assistant.values, assistant.name, model.actions)
+        self._others = list(further.values())
         self._no_others = read_only(np.zeros((0, model.actions)))
         self._memory = assistant.start(model)
         self._episode = -1

@@ -21,7 +21,7 @@ looks ahead at what each would believe. A best action is executed. A proposal a 
 alpha may exceed 1: then the floor lies below `v_min`.
 """
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -88,14 +88,30 @@ def unaware(options: LearnerAwareBumpersOptions, model: Model) -> Awareness:
 
 
 @compiled
-def aware(memory: Awareness, step: Step, options: LearnerAwareBumpersOptions) -> Awareness:
-    """The memory after a step."""
+def mirrored(memory: Any, step: Step, v_min: float) -> float:
+    """Let the mirrors of an assistant follow a step.
+
+    Args:
+        memory: of either rule, as it was before the step; its mirrors change.
+        step: what happened.
+        v_min: of the rule's options, in reward units.
+
+    Returns:
+        V*(s_0) of the step's episode, in reward units.
+    """
     start_value = memory.start_value
     if step.episode != memory.episode:
         start_value = best_value(step.values)
-    reflect(memory.mirrors, step, memory.discount, start_value - options.v_min)
+    reflect(memory.mirrors, step, memory.discount, start_value - v_min)
     if step.events & ENDS:
         between_episodes(memory.mirrors)
+    return start_value
+
+
+@compiled
+def aware(memory: Awareness, step: Step, options: LearnerAwareBumpersOptions) -> Awareness:
+    """The memory after a step."""
+    start_value = mirrored(memory, step, options.v_min)
     return Awareness(
         memory.mirrors, start_value, step.episode, memory.discount, memory.dynamics
     )  # fmt: skip

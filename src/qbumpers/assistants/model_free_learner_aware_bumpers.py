@@ -10,20 +10,18 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from qbumpers.assistants.learner_aware_bumpers import Outlook, weighed
+from qbumpers.assistants.learner_aware_bumpers import Outlook, mirrored, weighed
 from qbumpers.assistants.mirrors import (
     MIRRORS,
     Mirrors,
-    between_episodes,
     blank_mirrors,
-    reflect,
 )
 from qbumpers.assistants.registry import register_assistant
 from qbumpers.assistants.stochastic_q_bumpers import check_floor
 from qbumpers.choice import best_value
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step
-from qbumpers.tasks.dynamics import ENDS, TERMINATED
+from qbumpers.tasks.dynamics import TERMINATED
 
 _REMEMBERED = 10  # outcomes of an action
 _UNKNOWN = 0.5  # probability that an action that was never executed leads back to its state
@@ -79,12 +77,8 @@ def experienced(
     memory: Experience, step: Step, options: ModelFreeLearnerAwareBumpersOptions
 ) -> Experience:
     """The memory after a step."""
-    start_value, state, executed = memory.start_value, step.state, step.executed
-    if step.episode != memory.episode:
-        start_value = best_value(step.values)
-    reflect(memory.mirrors, step, memory.discount, start_value - options.v_min)
-    if step.events & ENDS:
-        between_episodes(memory.mirrors)
+    start_value = mirrored(memory, step, options.v_min)
+    state, executed = step.state, step.executed
     place = memory.seen[state, executed] % _REMEMBERED
     memory.next_state[state, executed, place] = -1 if step.events & TERMINATED else step.next_state
     memory.reward[state, executed, place] = step.reward

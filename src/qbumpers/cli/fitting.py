@@ -19,70 +19,77 @@ if TYPE_CHECKING:
 _LARGE_ERROR = 1.0  # of a log-likelihood; twice that tells two models apart
 
 
+Steps = Annotated[
+    str,
+    typer.Argument(
+        help="Recorded steps: a Parquet file, or a Minari dataset by its name or folder.",
+        metavar="STEPS",
+    ),
+]
+Learners = Annotated[
+    str | None,
+    typer.Option(
+        help="Learners to compare.", show_default="all of tables", metavar="NAME,NAME,..."
+    ),
+]
+Perceptions = Annotated[
+    str | None,
+    typer.Option(
+        help="Perceptions to compare.",
+        show_default="transition,observant,interruption",
+        metavar="NAME,NAME,...",
+    ),
+]
+Participants = Annotated[
+    int | None,
+    typer.Option(help="Only the first ones.", show_default="all", metavar="N", min=1),
+]
+Free = Annotated[
+    str | None,
+    typer.Option(
+        help="Further parameters to estimate, for example lapse,discount.",
+        metavar="NAME,NAME,...",
+    ),
+]
+Fixed = Annotated[
+    str | None,
+    typer.Option(
+        help="Parameters that are known, for example discount=0.99.", metavar="NAME=NUMBER,..."
+    ),
+]
+Training = Annotated[
+    int | None,
+    typer.Option(
+        help="Episodes over which schedules are counted.",
+        show_default="those recorded",
+        metavar="N",
+        min=1,
+    ),
+]
+Folds = Annotated[
+    int, typer.Option(help="Every so many episodes are held out together.", metavar="N", min=2)
+]
+Particles = Annotated[
+    int, typer.Option(help="Simulated learners, if something is hidden.", metavar="N", min=1)
+]
+Seed = Annotated[int, typer.Option(help="Of starting points and particles.", metavar="N", min=0)]
+Out = Annotated[Path | None, typer.Option(help="Folder for tables as CSV.", metavar="DIR")]
+
+
 @application.command()
 def fit(
-    steps: Annotated[
-        str,
-        typer.Argument(
-            help="Recorded steps: a Parquet file, or a Minari dataset by its name or folder.",
-            metavar="STEPS",
-        ),
-    ],
-    learners: Annotated[
-        str | None,
-        typer.Option(
-            help="Learners to compare.", show_default="all of tables", metavar="NAME,NAME,..."
-        ),
-    ] = None,
-    perceptions: Annotated[
-        str | None,
-        typer.Option(
-            help="Perceptions to compare.",
-            show_default="transition,observant,interruption",
-            metavar="NAME,NAME,...",
-        ),
-    ] = None,
-    participants: Annotated[
-        int | None,
-        typer.Option(help="Only the first ones.", show_default="all", metavar="N", min=1),
-    ] = None,
-    free: Annotated[
-        str | None,
-        typer.Option(
-            help="Further parameters to estimate, for example lapse,discount.",
-            metavar="NAME,NAME,...",
-        ),
-    ] = None,
-    fixed: Annotated[
-        str | None,
-        typer.Option(
-            help="Parameters that are known, for example discount=0.99.",
-            metavar="NAME=NUMBER,...",
-        ),
-    ] = None,
-    training: Annotated[
-        int | None,
-        typer.Option(
-            help="Episodes over which schedules are counted.",
-            show_default="those recorded",
-            metavar="N",
-            min=1,
-        ),
-    ] = None,
-    folds: Annotated[
-        int, typer.Option(help="Every so many episodes are held out together.", metavar="N", min=2)
-    ] = 2,
-    particles: Annotated[
-        int,
-        typer.Option(help="Simulated learners, if something is hidden.", metavar="N", min=1),
-    ] = 100,
-    seed: Annotated[
-        int, typer.Option(help="Of starting points and particles.", metavar="N", min=0)
-    ] = 0,
+    steps: Steps,
+    learners: Learners = None,
+    perceptions: Perceptions = None,
+    participants: Participants = None,
+    free: Free = None,
+    fixed: Fixed = None,
+    training: Training = None,
+    folds: Folds = 2,
+    particles: Particles = 100,
+    seed: Seed = 0,
     imports: Imports = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for tables as CSV.", metavar="DIR")
-    ] = None,
+    out: Out = None,
 ) -> None:
     """Find the learner that explains recorded choices best.
 

@@ -20,7 +20,7 @@ from qbumpers.tasks import TabularTask, Task
 from qbumpers.values import NetworkValues, QValues, check_width, solve
 from qbumpers.values.exact import SOLVED_ROWS, solved_rows
 from qbumpers.values.fitting import use_at
-from qbumpers.values.others import further_values, numbered
+from qbumpers.values.others import all_further_values, further_values, numbered
 from qbumpers.values.tabular import as_values
 
 
@@ -90,9 +90,7 @@ def _checked_network(
             "network's values, for instance of load_values or train_expert"
         )
     # They have the shape of Q*, or there would be no such values.
-    further: dict[str, Any] = {}
-    for name in assistant.values:
-        further |= further_values(values, name, assistant.name, task.actions)
+    further = all_further_values(values, assistant.values, assistant.name, task.actions)
     return values, tuple(further.values()), values.discount, tuple(further)
 
 

@@ -5,7 +5,7 @@ arrays are named "others.NAME.ARRAY", and their provenance is part of that of Q*
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -87,6 +87,26 @@ def separated(
 def numbered(name: str, count: int) -> list[str]:
     """Names of the rows of further values that have several: NAME_0, NAME_1, ..."""
     return [f"{name}_{place}" for place in range(count)]
+
+
+def all_further_values(
+    values: Any, names: Iterable[str], assistant: str, actions: int
+) -> dict[str, Any]:
+    """Further values beside Q* of several names, by the names of their rows, in that order.
+
+    Args:
+        values: as for `further_values`.
+        names: which further values its rule asks for.
+        assistant: its name, for the message.
+        actions: A.
+
+    Raises:
+        RequestError: as `further_values`.
+    """
+    found: dict[str, Any] = {}
+    for name in names:
+        found |= further_values(values, name, assistant, actions)
+    return found
 
 
 def further_values(values: Any, name: str, assistant: str, actions: int) -> dict[str, Any]:
