@@ -99,6 +99,7 @@ def test_shares_fall_in_steps_at_the_critical_thresholds():
     [axes] = shares_figure(moves).axes
     assert axes.get_xscale() == "log"
     assert axes.get_xlabel() == "threshold α (logarithmic)"
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["0.001", "0.01", "0.1", "1"]
     assert axes.get_ylabel() == "suboptimal moves\noverridden, per cent"
     assert [text.get_text() for text in present(axes.get_legend()).get_texts()] == list(KINDS)
     for kind, line in enumerate(axes.lines):

@@ -21,6 +21,7 @@ from qbumpers.tasks.cliff_walking import COLUMNS, GOAL, ROWS, START, is_cliff, s
 _OVERRIDDEN, _FREE, _OPTIMAL, _CLIFF = "#d55e00", "#d9e7f2", "#ffffff", "#4d5359"
 _KIND_COLOURS = ("#000000", "#d55e00", "#0072b2")
 _KIND_DASHES = ("-", "--", ":")
+_POWERS = (0.001, 0.01, 0.1, 1.0)  # in words of their own: figures read no formulas
 # Corners of a position's four triangles, by action: up, right, down, left; the middle comes last.
 _CORNERS = np.array(
     [[(0, 0), (1, 0)], [(1, 0), (1, 1)], [(1, 1), (0, 1)], [(0, 1), (0, 0)]], np.float64
@@ -103,6 +104,7 @@ def shares_figure(moves: list[Move]) -> Figure:
                 drawstyle="steps-post", linewidth=2,
             )  # fmt: skip
         axes.set_xscale("log")
+        axes.set_xticks(_POWERS, [f"{power:g}" for power in _POWERS])
         axes.set(
             xlabel="threshold α (logarithmic)",
             ylabel="suboptimal moves\noverridden, per cent",
