@@ -13,7 +13,7 @@ from websockets.typing import Origin
 
 from tests.narrowing import present
 
-ADDRESS = re.compile(r"http://(127\.0\.0\.1:\d+)/")
+ADDRESS = re.compile(r"https?://([\w.]+:\d+)/")
 
 
 @contextlib.contextmanager
@@ -21,7 +21,8 @@ def served(setup, choice, path, second=0.01):
     """The address of a server in a thread."""
     import uvicorn
 
-    from qbumpers.study.running import configuration, listening_at
+    from qbumpers.study.addresses import listening_at
+    from qbumpers.study.running import configuration
     from qbumpers.study.server import Sessions, make_application
     from qbumpers.study.tables import open_records
 
@@ -54,8 +55,8 @@ class Process:
         )  # fmt: skip
         found = ADDRESS.search(present(self._process.stdout).readline())
         assert found, "it does not say where it serves"
-        self.address = found[1]
-        self._port = int(self.address.rpartition(":")[2])
+        self.url, self.address = found[0], found[1]
+        self._port = self._port or int(self.address.rpartition(":")[2])
 
     def kill(self):
         """SIGKILL: nothing can be written any more."""
@@ -75,8 +76,8 @@ class Process:
 
 
 @contextlib.contextmanager
-def process(*arguments):
-    running = Process(*arguments)
+def process(*arguments, port=0):
+    running = Process(*arguments, port=port)
     try:
         yield running
     finally:

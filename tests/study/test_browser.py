@@ -386,9 +386,9 @@ def delayed(address, seconds):
 
 @pytest.mark.parametrize("round_trip", [0.1, 0.2])
 def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened, round_trip):
-    from qbumpers.study import running, server, tables
+    from qbumpers.study import addresses, running, server, tables
 
-    listening = running.listening_at(0)
+    listening = addresses.listening_at(0)
     near = f"127.0.0.1:{listening.getsockname()[1]}"
     with contextlib.closing(listening), delayed(near, round_trip / 2) as far:
         import uvicorn

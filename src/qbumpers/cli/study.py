@@ -31,6 +31,8 @@ Values = Annotated[
         metavar="FILE",
     ),
 ]
+Port = Annotated[int, typer.Option(help="0 for any that is free.", metavar="N")]
+Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
@@ -53,8 +55,29 @@ def play(
     alpha: Alpha = None,
     values: Values = None,
     discount: Discount = None,
-    port: Annotated[int, typer.Option(help="Of this machine; 0 for any.", metavar="N")] = 8765,
-    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
+            metavar="ADDRESS",
+        ),
+    ] = "127.0.0.1",
+    port: Port = 8765,
+    certificate: Annotated[
+        Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")
+    ] = None,
+    key: Annotated[
+        Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")
+    ] = None,
+    behind_proxy: Annotated[
+        str | None,
+        typer.Option(
+            help="Where a proxy serves it: https://study.example.org",
+            metavar="URL",
+            show_default=False,
+        ),
+    ] = None,
+    browser: Browser = True,
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
     ] = Path("results/play"),
@@ -68,6 +91,7 @@ def play(
     """
     _check_installed()
     import_modules(imports or (), "--import")
+    from qbumpers.study.addresses import Address
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
     from qbumpers.study.setup import Setup
@@ -79,9 +103,11 @@ def play(
         choice = Choice(*_DEFAULT)
     else:
         choice = Choice(assistant or _DEFAULT[0], options)
+    address = Address(host, port, certificate, key, behind_proxy or "")
+    address.check()  # before anything is solved
     setup = Setup(task, values, discount=discount)
     try:
-        serve(setup, choice, out, port=port, browser=browser, announce=_announce)
+        serve(setup, choice, out, address=address, browser=browser, announce=_announce)
     except KeyboardInterrupt:
         OUTPUT.print("\nStopped; what was played is kept.")
 
