@@ -17,19 +17,16 @@ ADDRESS = re.compile(r"https?://([\w.]+:\d+)/")
 
 
 @contextlib.contextmanager
-def served(setup, choice, path, second=0.01):
-    """The address of a server in a thread."""
+def running(make):
+    """The address of a server in a thread; `make` is called with it."""
     import uvicorn
 
     from qbumpers.study.addresses import listening_at
     from qbumpers.study.running import configuration
-    from qbumpers.study.server import Sessions, make_application
-    from qbumpers.study.tables import open_records
 
     with contextlib.closing(listening_at(0)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
-        sessions = Sessions(setup, choice, open_records(path), second)
-        server = uvicorn.Server(configuration(make_application(sessions, [address])))
+        server = uvicorn.Server(configuration(make(address)))
         thread = threading.Thread(target=server.run, args=[[listening]])
         thread.start()
         try:
@@ -38,6 +35,27 @@ def served(setup, choice, path, second=0.01):
             server.should_exit = True
             thread.join(10)
             assert not thread.is_alive()
+
+
+def served(setup, choice, path, second=0.01, also=()):
+    """The address of a server that is played on; pages may address it by others `also`."""
+    from qbumpers.study.server import Sessions, make_application
+    from qbumpers.study.tables import open_records
+
+    return running(
+        lambda address: make_application(
+            Sessions(setup, choice, open_records(path), second), [address, *also]
+        )
+    )
+
+
+def replayed(path):
+    """The address, with a path, of a server that shows what is recorded."""
+    from qbumpers.study.replaying import records_at, replay_file
+    from qbumpers.study.showing import Showing, make_showing
+
+    showing = Showing(records_at(path), list(replay_file(path)))
+    return running(lambda address: make_showing(showing, [address], "secret"))
 
 
 class Process:

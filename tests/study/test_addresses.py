@@ -97,7 +97,7 @@ def test_files_that_are_no_certificate_are_refused(certificate, tmp_path):
     with pytest.raises(RequestError, match="every address and no name"):
         Address("0.0.0.0", 0, *certificate).check()
     Address("192.168.1.5", 0, *certificate).check()
-    Address("0.0.0.0", 0, *certificate, PUBLIC).check()
+    Address("0.0.0.0", 0, *certificate, public=PUBLIC).check()
 
 
 @pytest.mark.parametrize(

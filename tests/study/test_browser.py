@@ -2,89 +2,25 @@
 
 import contextlib
 import queue
-import shutil
 import socket
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
 from qbumpers.study.game import Choice
 from qbumpers.study.tables import open_records, read_session, sessions_in
 from tests.narrowing import present
+from tests.study.browsing import AXE, WIDTHS, violations
 from tests.study.serving import process, served
 
 pytestmark = pytest.mark.study
 
-ROOT = Path(__file__).parents[2]
-AXE = ROOT / ".browser" / "node_modules" / "axe-core" / "axe.min.js"
-FLAGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-]  # fmt: skip
-WIDTHS = {"desktop": 1280, "phone": 390}
 KEYS = ["ArrowUp", *["KeyD"] * 11, "ArrowDown"]
 """Around the cliff."""
 MINUS_13 = "\N{MINUS SIGN}13"
 SINCE = "step => Number(document.getElementById('step').textContent) >= step"
 ALONE = Choice("stochastic-q-bumpers", {"alpha": 0.5}, assisted=False)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    found = shutil.which("chromium")
-    if found is None:
-        pytest.skip("chromium is not installed: .ci/install_browser")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def opened(pages):
-    """Opens a page in a browser of its own."""
-    return pages[0]
-
-
-@pytest.fixture
-def open_in(pages):
-    """Opens one more page in the browser of another."""
-    return pages[1]
-
-
-@pytest.fixture
-def pages(browser):
-    """Opens pages; whatever goes wrong in one is an error of the test."""
-    wrong, contexts = [], []
-
-    def open_page(address, device="desktop", scheme="light", before="", **options):
-        height = 860 if device == "desktop" else 844
-        context = browser.new_context(
-            viewport={"width": WIDTHS[device], "height": height}, color_scheme=scheme,
-            has_touch=device == "phone", **options,
-        )  # fmt: skip
-        contexts.append(context)
-        if before:
-            context.add_init_script(before)
-        return open_in(context, address)
-
-    def open_in(context, address):
-        page = context.new_page()
-        page.set_default_timeout(15_000)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
-        page.goto(f"http://{address}/")
-        page.wait_for_selector("#task:not(:empty)")
-        return page
-
-    yield open_page, open_in
-    for context in contexts:
-        context.close()
-    # A server that is gone is what some tests are about.
-    assert [text for text in wrong if "ERR_CONNECTION" not in text] == []
 
 
 @pytest.fixture
@@ -414,15 +350,6 @@ def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened,
         finally:
             serving.should_exit = True
             thread.join(10)
-
-
-def violations(page):
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-    tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
-    found = page.evaluate("tags => axe.run({runOnly: tags})", tags)
-    return [
-        (each["id"], [node["target"] for node in each["nodes"]]) for each in found["violations"]
-    ]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

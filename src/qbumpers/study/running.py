@@ -16,6 +16,7 @@ from qbumpers.study.messages import MOST_BYTES
 from qbumpers.study.prompt import PromptHTTP, PromptLoop, PromptSocket, allow_connections, plain_log
 from qbumpers.study.server import Sessions, make_application
 from qbumpers.study.setup import Setup
+from qbumpers.study.showing import Showing, make_showing, new_secret
 from qbumpers.study.tables import open_records
 
 RECORDS = "play.sqlite"
@@ -56,12 +57,33 @@ def play(
     serve(make, address, browser=browser, announce=lambda url: announce(url, path))
 
 
+def show(showing: Showing, *, port: int, browser: bool, announce: Callable[[str], None]) -> None:
+    """Show recorded sessions on this machine until Ctrl-C.
+
+    Args:
+        showing: the sessions.
+        port: of this machine; any that is free if 0.
+        browser: whether to open the page in a browser.
+        announce: is called with the page's URL before it is served.
+
+    Raises:
+        RequestError: if the port is in use.
+    """
+    secret = new_secret()
+
+    def make(hosts: list[str]) -> Any:
+        return make_showing(showing, hosts, secret)
+
+    serve(make, Address(port=port), browser=browser, announce=announce, path=f"{secret}/")
+
+
 def serve(
     make: Callable[[list[str]], Any],
     address: Address,
     *,
     browser: bool,
     announce: Callable[[str], None],
+    path: str = "",
 ) -> None:
     """Serve an application until Ctrl-C.
 
@@ -70,6 +92,7 @@ def serve(
         address: where to listen, checked.
         browser: whether to open the page in a browser.
         announce: is called with the page's URL before anyone is served.
+        path: of the page.
 
     Raises:
         RequestError: if the address is in use, or what `make` raises.
@@ -77,7 +100,7 @@ def serve(
     with contextlib.closing(listening_at(address.port, address.host)) as listening:
         hosts = address.hosts(listening.getsockname()[1])
         application = make(hosts)
-        url = f"{address.scheme}://{hosts[0]}/"
+        url = f"{address.scheme}://{hosts[0]}/{path}"
         announce(url)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
