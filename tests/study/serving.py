@@ -61,15 +61,20 @@ def replayed(path):
 class Process:
     """`qbumpers play` in a process of its own, at a port that stays when it is started again."""
 
-    def __init__(self, *arguments, port=0):
-        self._arguments, self._port = arguments, port
+    def __init__(self, *arguments, port=0, errors=None):
+        self._arguments, self._port, self._errors = arguments, port, errors
         self.start()
+
+    @property
+    def pid(self):
+        return self._process.pid
 
     def start(self):
         self._process = subprocess.Popen(
             [sys.executable, "-m", "qbumpers", "play", *self._arguments, "--no-browser", "--port",
              str(self._port)],
-            stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE, stderr=self._errors, text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
         found = ADDRESS.search(present(self._process.stdout).readline())
         assert found, "it does not say where it serves"
@@ -94,12 +99,12 @@ class Process:
 
 
 @contextlib.contextmanager
-def process(*arguments, port=0):
-    running = Process(*arguments, port=port)
+def process(*arguments, port=0, errors=None):
+    playing = Process(*arguments, port=port, errors=errors)
     try:
-        yield running
+        yield playing
     finally:
-        running.kill()
+        playing.kill()
 
 
 class Page:
@@ -120,7 +125,7 @@ class Page:
     def send(self, **message):
         self.socket.send(json.dumps(message))
 
-    def next(self, kind=None, timeout=10):
+    def next(self, kind=None, timeout=10.0):
         """The next message, or the next of a kind."""
         while True:
             message = json.loads(self.socket.recv(timeout=timeout))

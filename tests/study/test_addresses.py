@@ -19,6 +19,7 @@ from websockets.typing import Origin
 
 from qbumpers.errors import RequestError
 from qbumpers.study.addresses import Address, is_loopback, listening_at
+from qbumpers.study.prompt import REQUEST_WITHIN
 from tests.study.serving import UP, process
 
 PAGE = Path(__file__).parents[2] / "docs" / "hosting.md"
@@ -230,3 +231,14 @@ def test_the_example_of_nginx_serves_the_page(certificate, tmp_path):
         direct = f"http://127.0.0.1:{port}/"
         with pytest.raises(urllib.error.HTTPError, match="421"):
             urllib.request.urlopen(direct, timeout=10)
+
+
+@pytest.mark.slow
+def test_who_does_not_finish_the_handshake_of_tls_is_cut_off(certificate, tmp_path):
+    arguments = ["--host", "localhost", "--certificate", str(certificate[0]), "--key",
+                 str(certificate[1]), "--out", str(tmp_path)]  # fmt: skip
+    with process("cliff-walking", *arguments) as server:
+        host, port = server.address.split(":")
+        with socket.create_connection((host, int(port)), 20) as connection:
+            connection.settimeout(REQUEST_WITHIN + 5)
+            assert connection.recv(10) == b""

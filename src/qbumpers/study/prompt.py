@@ -35,8 +35,9 @@ class PromptHTTP(H11Protocol):
             self.loop.call_later(LASTS, transport.abort),
         ]
         others = [each for each in self.connections if isinstance(each, PromptHTTP)]
-        if len(others) > MOST_IDLE:
-            min(others, key=PromptHTTP._worth).transport.abort()
+        staying = [each for each in others if not each.transport.is_closing()]
+        if len(staying) > MOST_IDLE:
+            min(staying, key=PromptHTTP._worth).transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """See asyncio."""
@@ -47,6 +48,12 @@ class PromptHTTP(H11Protocol):
         """See uvicorn."""
         self._stop_timers()
         super().handle_websocket_upgrade(event)
+
+    def send_400_response(self, msg: str) -> None:
+        """See uvicorn."""
+        if self._has_asked():
+            self.cycle.disconnected = True  # or its answer, which is on the way, would fail
+        super().send_400_response(msg)
 
     def _worth(self) -> tuple[bool, float]:
         return self._has_asked(), self._began

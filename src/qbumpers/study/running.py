@@ -127,6 +127,7 @@ def configuration(application: object, address: Address | None = None) -> uvicor
         ws_ping_timeout=10,
         ws_per_message_deflate=False,  # messages are small, and time is short
         timeout_keep_alive=5,
+        backlog=128,  # also how many are taken at once before others have their turn
         timeout_graceful_shutdown=2,
         proxy_headers=False,  # nothing hangs on what anyone can write into a header
         server_header=False,
