@@ -62,8 +62,8 @@ def attacked(folder, seconds, half_open, seed=0):
             attack = _Attack(server, seconds, half_open, seed)
             asyncio.run(attack.run())
             status, printed = server.interrupt()
-            assert (status, "Stopped" in printed) == (0, True)
         errors.seek(0)
+        assert (status, "Stopped" in printed) == (0, True), (status, printed, errors.read())
         return Found(**attack.found, output=errors.read(), records=folder / "play.sqlite")
 
 

@@ -1,9 +1,5 @@
 """The page in a real browser: keys, touch, gamepad, reloads, a killed server, accessibility."""
 
-import contextlib
-import queue
-import socket
-import threading
 import time
 
 import pytest
@@ -283,73 +279,6 @@ def test_a_second_tab_takes_over_and_the_first_says_so(cliff_server, opened, ope
     first.bring_to_front()
     first.click("#go")
     expect_step(first, 4)
-
-
-@contextlib.contextmanager
-def delayed(address, seconds):
-    """Another address of a server, so far away that each way takes some time."""
-    host, port = address.split(":")
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-
-        def carry(source, sink):
-            waiting = queue.SimpleQueue()
-            threading.Thread(target=deliver, args=[waiting, sink], daemon=True).start()
-            with contextlib.suppress(OSError):
-                while data := source.recv(65536):
-                    waiting.put((time.monotonic() + seconds, data))
-            waiting.put((0.0, b""))
-
-        def deliver(waiting, sink):
-            with contextlib.suppress(OSError), sink:
-                while True:
-                    due, data = waiting.get()
-                    if not data:
-                        break
-                    time.sleep(max(0.0, due - time.monotonic()))
-                    sink.sendall(data)
-
-        def accept():
-            with contextlib.suppress(OSError):
-                while True:
-                    near = listening.accept()[0]
-                    far = socket.create_connection((host, int(port)))
-                    for ends in ((near, far), (far, near)):
-                        threading.Thread(target=carry, args=ends, daemon=True).start()
-
-        threading.Thread(target=accept, daemon=True).start()
-        yield f"127.0.0.1:{listening.getsockname()[1]}"
-
-
-@pytest.mark.parametrize("round_trip", [0.1, 0.2])
-def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened, round_trip):
-    from qbumpers.study import addresses, running, server, tables
-
-    listening = addresses.listening_at(0)
-    near = f"127.0.0.1:{listening.getsockname()[1]}"
-    with contextlib.closing(listening), delayed(near, round_trip / 2) as far:
-        import uvicorn
-
-        sessions = server.Sessions(cliff, ALONE, tables.open_records(records))
-        serving = uvicorn.Server(
-            running.configuration(server.make_application(sessions, [near, far]))
-        )
-        thread = threading.Thread(target=serving.run, args=[[listening]])
-        thread.start()
-        try:
-            page = opened(far)
-            begin(page)
-            for key in KEYS[:3]:  # faster than answers come
-                page.keyboard.press(key)
-            expect_step(page, 3)
-            began = time.monotonic()
-            walk(page, KEYS[3:])
-            assert time.monotonic() - began < 10 * (round_trip + 0.4)
-            page.wait_for_selector("#go:visible")
-            assert page.inner_text("#return") == "87"
-            page.context.close()
-        finally:
-            serving.should_exit = True
-            thread.join(10)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

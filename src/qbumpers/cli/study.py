@@ -110,10 +110,9 @@ def play(
     address = Address(host, port, certificate, key, behind_proxy or "")
     address.check()  # before anything is solved
     setup = Setup(task, values, discount=discount)
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         serve(setup, choice, out, address=address, browser=browser, announce=_announce)
-    except KeyboardInterrupt:
-        OUTPUT.print("\nStopped; what was played is kept.")
+    OUTPUT.print("\nStopped; what was played is kept.")
 
 
 def _announce(url: str, records: Path) -> None:
