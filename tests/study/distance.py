@@ -115,8 +115,10 @@ def holds_felt(page, times=2):
     found = []
     for _ in range(times):
         begin(page)
-        for held in [("ArrowUp", 2), ("ArrowLeft", 1), ("ArrowUp", 2)]:  # before it is down
-            found.append(page.evaluate("([code, action]) => pilot.hold(code, action)", held))
+        found += [
+            page.evaluate("([code, action]) => pilot.hold(code, action)", held)
+            for held in [("ArrowUp", 2), ("ArrowLeft", 1), ("ArrowUp", 2)]  # before it is down
+        ]
         page.wait_for_selector("#go:visible", timeout=60_000)
     return found
 

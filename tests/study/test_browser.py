@@ -236,6 +236,27 @@ def test_a_gamepad_plays(cliff_server, records, opened):
     assert [(row["device"], row["proposed"]) for row in rows] == [("gamepad", 0), ("gamepad", 1)]
 
 
+def test_a_gamepad_flies_the_lander(lander_server, records, opened):
+    page = opened(lander_server, before=GAMEPAD)
+    page.click("#go")
+    page.wait_for_selector("#overlay", state="hidden")
+    page.evaluate("window.pressed = [12]")
+    page.wait_for_function(SINCE, arg=20)
+    page.evaluate("window.pressed = []")
+    page.wait_for_selector("#pad .pressed", state="detached")
+    page.click("#pause")
+    page.wait_for_selector("#go:visible")
+    rows = [row for row in rows_of(records) if row["device"] == "gamepad"]
+    assert len(rows) > 5
+    assert {row["proposed"] for row in rows} <= {0, 2}
+    assert 2 in {row["proposed"] for row in rows}
+
+
+def test_the_keys_are_said_before_the_first_episode(lander_server, opened):
+    page = opened(lander_server)
+    assert "Keys: ← left, ↑ main, → right, ↓ nothing." in page.inner_text("#detail")
+
+
 def test_a_reload_goes_on_in_mid_episode(cliff_server, opened):
     page = opened(cliff_server)
     begin(page)
