@@ -23,6 +23,9 @@ from tests.study.serving import served
 PILOT = (Path(__file__).parent / "pilot.js").read_text(encoding="utf-8")
 """Measures what a page feels, and lands: see there."""
 
+ON_BOTH_ENDS = 0.04
+"""Seconds: two steps of the lander."""
+
 KEYS = ["ArrowUp", *["ArrowRight"] * 11, "ArrowDown"]
 
 
@@ -123,15 +126,16 @@ def holds_felt(page, times=2):
     return found
 
 
-def landings(page, delay, episodes):
+def landings(page, round_trip, episodes):
     """Returns and successes of the pilot, who sees what is drawn and presses keys.
 
-    It reckons with a delay of so many seconds.
+    It reckons with the round trip, and with what it takes until the server uses a key and until
+    the page has drawn what comes of it.
     """
     found = []
     for _ in range(episodes):
         begin(page)
-        page.evaluate("delay => pilot.fly(delay)", delay)
+        page.evaluate("delay => pilot.fly(delay)", round_trip + ON_BOTH_ENDS)
         page.wait_for_selector("#go:visible", timeout=60_000)
         found.append(page.evaluate("() => pilot.ended()"))
     return found

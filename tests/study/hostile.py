@@ -22,6 +22,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 from websockets.typing import Origin
 
+from qbumpers.study.replaying import replay_file
 from tests.study.nonsense import frames, nonsense, requests
 from tests.study.serving import AROUND, process
 
@@ -65,6 +66,16 @@ def attacked(folder, seconds, half_open, seed=0):
         errors.seek(0)
         assert (status, "Stopped" in printed) == (0, True), (status, printed, errors.read())
         return Found(**attack.found, output=errors.read(), records=folder / "play.sqlite")
+
+
+def check_records(found):
+    """Every step that a page was shown is in the record, and the record replays."""
+    steps = {each.session: each for each in replay_file(found.records)}
+    assert {each.difference for each in steps.values()} == {""}
+    for session, acknowledged in found.acknowledged.items():
+        assert steps[session].steps == acknowledged
+    for session, acknowledged in found.fuzzed.items():
+        assert steps[session].steps >= acknowledged
 
 
 def allow_files():
@@ -254,6 +265,7 @@ def main():
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = attacked(folder, given.seconds, given.half_open)
+        check_records(found)
         middle, high = 1000 * np.percentile(found.late, [50, 99])
         print(f"load of the machine at the end: {os.getloadavg()[0]:.1f}")
         for kind, count in sorted(found.attacks.items()):
