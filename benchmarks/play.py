@@ -45,8 +45,9 @@ def serve(task: str, folder: Path) -> None:
     """A server without countdowns, until it is terminated."""
     import uvicorn
 
+    from qbumpers.study.addresses import listening_at
     from qbumpers.study.game import Choice
-    from qbumpers.study.running import configuration, listening_at
+    from qbumpers.study.running import configuration
     from qbumpers.study.server import Sessions, make_application
     from qbumpers.study.setup import Setup
     from qbumpers.study.tables import open_records

@@ -1,9 +1,10 @@
 """`qbumpers play` and `qbumpers study`."""
 
+import contextlib
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -13,6 +14,9 @@ from qbumpers.cli.console import OUTPUT
 from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError, counted
 from qbumpers.imports import import_modules
+
+if TYPE_CHECKING:
+    from qbumpers.study.replaying import Replayed
 
 study = typer.Typer(help="Look after what was played in the browser.", no_args_is_help=True)
 application.add_typer(study, name="study")
@@ -31,6 +35,8 @@ Values = Annotated[
         metavar="FILE",
     ),
 ]
+Port = Annotated[int, typer.Option(help="0 for any that is free.", metavar="N")]
+Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
@@ -53,8 +59,29 @@ def play(
     alpha: Alpha = None,
     values: Values = None,
     discount: Discount = None,
-    port: Annotated[int, typer.Option(help="Of this machine; 0 for any.", metavar="N")] = 8765,
-    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    host: Annotated[
+        str,
+        typer.Option(
+            help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
+            metavar="ADDRESS",
+        ),
+    ] = "127.0.0.1",
+    port: Port = 8765,
+    certificate: Annotated[
+        Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")
+    ] = None,
+    key: Annotated[
+        Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")
+    ] = None,
+    behind_proxy: Annotated[
+        str | None,
+        typer.Option(
+            help="Where a proxy serves it: https://study.example.org",
+            metavar="URL",
+            show_default=False,
+        ),
+    ] = None,
+    browser: Browser = True,
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
     ] = Path("results/play"),
@@ -68,6 +95,7 @@ def play(
     """
     _check_installed()
     import_modules(imports or (), "--import")
+    from qbumpers.study.addresses import Address
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
     from qbumpers.study.setup import Setup
@@ -79,11 +107,12 @@ def play(
         choice = Choice(*_DEFAULT)
     else:
         choice = Choice(assistant or _DEFAULT[0], options)
+    address = Address(host, port, certificate, key, behind_proxy or "")
+    address.check()  # before anything is solved
     setup = Setup(task, values, discount=discount)
-    try:
-        serve(setup, choice, out, port=port, browser=browser, announce=_announce)
-    except KeyboardInterrupt:
-        OUTPUT.print("\nStopped; what was played is kept.")
+    with contextlib.suppress(KeyboardInterrupt):
+        serve(setup, choice, out, address=address, browser=browser, announce=_announce)
+    OUTPUT.print("\nStopped; what was played is kept.")
 
 
 def _announce(url: str, records: Path) -> None:
@@ -116,25 +145,46 @@ def _value_of(text: str) -> Any:
 @study.command("replay")
 def replay_records(
     file: Annotated[Path, typer.Argument(help="What play recorded.", metavar="FILE")],
+    session: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this one; may be repeated.", metavar="ID", show_default="all"),
+    ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Say it here, and show no page.")] = False,
+    port: Port = 8766,
+    browser: Browser = True,
     imports: Imports = None,
 ) -> None:
-    """Decide recorded sessions again, and say whether anything comes out differently.
+    """Decide recorded sessions again, say whether anything comes out differently, and show them.
+
+    Exit status 1 if anything does. Ctrl-C ends the page.
 
     Example: qbumpers study replay results/play/play.sqlite
     """
     _check_installed()
     import_modules(imports or (), "--import")
-    from qbumpers.study.replaying import replay_file
+    from qbumpers.study.replaying import records_at, replay_file
+    from qbumpers.study.running import show
+    from qbumpers.study.showing import Showing
 
-    different = 0
-    for found in replay_file(file):
+    replayed: list[Replayed] = []
+    for found in replay_file(file, session or ()):
         sizes = f"{counted(found.episodes, 'episode')}, {counted(found.steps, 'step')}"
         verdict = f"different: {found.difference}" if found.difference else "OK"
         line = f"{found.session} {found.task}: {sizes}: {verdict}"
         OUTPUT.print(escape(line), soft_wrap=True)
-        different += bool(found.difference)
-    if different:
+        replayed.append(found)
+    if not check:
+        if not replayed:
+            raise RequestError(f"records file {file}: it has no session to be shown")
+        showing = Showing(records_at(file), replayed)
+        with contextlib.suppress(KeyboardInterrupt):
+            show(showing, port=port, browser=browser, announce=_announce_replay)
+    if any(found.difference for found in replayed):
         raise typer.Exit(1)
+
+
+def _announce_replay(url: str) -> None:
+    OUTPUT.print(f"Watch at [bold]{url}[/bold] ; Ctrl-C ends it.", soft_wrap=True)
 
 
 def _check_installed() -> None:

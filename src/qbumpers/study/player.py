@@ -299,9 +299,12 @@ class Player:
 
     def _proposed_now(self) -> Proposal:
         held = self._held
+        idle = self._display.idle
+        if idle < 0:
+            idle = self._game.number % self._game.setup.task.actions
         if held is None:
-            return Proposal(self._display.idle, "none", None, None, None)
-        action = self._display.idle if held.action is None else held.action
+            return Proposal(idle, "none", None, None, None)
+        action = idle if held.action is None else held.action
         return Proposal(action, held.device, held.pressed, held.shown, self._held_since)
 
 

@@ -5,7 +5,7 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import AsyncGenerator, Collection
+from collections.abc import AsyncGenerator, Collection, Generator
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,12 @@ STATIC = Path(__file__).with_name("static")
 MOST_CONNECTIONS = 200
 """Pages at once."""
 
-_GREETING = 5.0  # seconds within which a page must greet
+MOST_SILENT = 100
+"""Sockets at once that have not greeted; if one more comes, the one that waited longest goes."""
+
+GREETING = 5.0
+"""Seconds within which a page must greet."""
+
 _LOGGER = logging.getLogger("qbumpers.study")
 
 
@@ -70,7 +75,8 @@ class Sessions:
         self._signer = URLSafeSerializer(secret_of(engine), salt="session")
         self._players: dict[str, Player] = {}
         self._finding = asyncio.Lock()
-        self.open = 0
+        self._open = 0
+        self._silent: list[asyncio.Timeout] = []
         self._facts: dict[str, Any] = {
             "task": task_view(setup),
             "offers": offers(setup),
@@ -80,6 +86,42 @@ class Sessions:
                 "assisted": choice.assisted,
             },
         }
+
+    async def greeted(self, connection: Connection) -> Hello:
+        """What a page says first.
+
+        Raises:
+            RequestError: if it is no greeting.
+            TimeoutError: if it does not come soon, or others wait that came later.
+            GoneError: if the page has gone.
+        """
+        async with asyncio.timeout(GREETING) as limit:
+            self._silent.append(limit)
+            if len(self._silent) > MOST_SILENT:
+                self._silent.pop(0).reschedule(0.0)
+            try:
+                hello = await connection.receive()
+            finally:
+                with contextlib.suppress(ValueError):  # if it had to go, it is out already
+                    self._silent.remove(limit)
+        if not isinstance(hello, Hello):
+            raise RequestError("the first message of a page is hello")
+        return hello
+
+    @contextlib.contextmanager
+    def page(self) -> Generator[None, None, None]:
+        """One more page.
+
+        Raises:
+            TooMuchError: if there are too many.
+        """
+        if self._open >= MOST_CONNECTIONS:
+            raise TooMuchError("too many pages are open")
+        self._open += 1
+        try:
+            yield
+        finally:
+            self._open -= 1
 
     async def join(self, connection: Connection, hello: Hello) -> Player:
         """The session of a page that has greeted; it is that page's from now on.
@@ -150,25 +192,14 @@ class Sessions:
 
 async def _converse(sessions: Sessions, connection: Connection) -> None:
     """Everything that a page says, until it goes."""
-    player: Player | None = None
     try:
-        async with asyncio.timeout(_GREETING):
-            hello = await connection.receive()
-        if not isinstance(hello, Hello):
-            raise RequestError("the first message of a page is hello")
-        player = await sessions.join(connection, hello)
-        await sessions.welcome(player, connection, hello)
-        while True:
-            try:
-                await player.handle(await connection.receive())
-            except TooMuchError:
-                raise
-            except RequestError as error:
-                await connection.send("problem", message=str(error))
+        hello = await sessions.greeted(connection)
+        with sessions.page():
+            await _play(sessions, connection, hello)
     except GoneError:
         pass
     except TimeoutError:
-        await connection.close(WRONG, f"no hello within {_GREETING:.0f} seconds")
+        await connection.close(WRONG, f"no hello within {GREETING:.0f} seconds")
     except UnknownSessionError as error:
         await connection.close(UNKNOWN_SESSION, str(error))
     except TooMuchError as error:
@@ -178,17 +209,31 @@ async def _converse(sessions: Sessions, connection: Connection) -> None:
     except Exception:
         _LOGGER.exception("a session failed")
         await connection.close(1011, "the server failed; what happened before is kept")
+
+
+async def _play(sessions: Sessions, connection: Connection, hello: Hello) -> None:
+    """What a page says once it has greeted."""
+    player = await sessions.join(connection, hello)
+    try:
+        await sessions.welcome(player, connection, hello)
+        while True:
+            try:
+                await player.handle(await connection.receive())
+            except TooMuchError:
+                raise
+            except RequestError as error:
+                await connection.send("problem", message=str(error))
     finally:
-        if player is not None:
-            await sessions.leave(player, connection)
+        await sessions.leave(player, connection)
 
 
-def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
+def make_application(sessions: Sessions, hosts: Collection[str], scheme: str = "http") -> Any:
     """The server as an ASGI application.
 
     Args:
         sessions: that are played on it; closed when it ends.
         hosts: names with ports by which pages may address it.
+        scheme: "http" or "https", of the pages.
     """
 
     async def page(_: Request) -> FileResponse:
@@ -196,15 +241,7 @@ def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
 
     async def socket(websocket: WebSocket) -> None:
         await websocket.accept()
-        connection = Connection(websocket)
-        if sessions.open >= MOST_CONNECTIONS:
-            await connection.close(TOO_MUCH, "too many pages are open")
-            return
-        sessions.open += 1
-        try:
-            await _converse(sessions, connection)
-        finally:
-            sessions.open -= 1
+        await _converse(sessions, Connection(websocket))
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
@@ -216,4 +253,4 @@ def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), hosts)
+    return Guard(Starlette(routes=routes, lifespan=lifespan), hosts, scheme)

@@ -241,3 +241,34 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
         for row in connection.execute(steps).mappings():
             played[int(row["episode"])].steps.append(step_of_row(row))
     return Recorded(session, int(found["seed"]), json.loads(found["setup"]), played)
+
+
+class Moment(NamedTuple):
+    """How a step came about.
+
+    Attributes:
+        device: that the participant used.
+        shown: see `TIMES`.
+        pressed: likewise.
+        received: likewise.
+        applied: likewise.
+    """
+
+    device: str
+    shown: float | None
+    pressed: float | None
+    received: float | None
+    applied: float | None
+
+
+def read_moments(engine: sql.Engine, session: str) -> list[Moment]:
+    """How every step of a session came about, in their order.
+
+    Args:
+        engine: of the records.
+        session: identifier.
+    """
+    columns = [STEPS.c[field] for field in Moment._fields]
+    found = sql.select(*columns).where(STEPS.c.session == session).order_by(STEPS.c.number)
+    with engine.connect() as connection:
+        return [Moment(*row) for row in connection.execute(found)]
