@@ -19,8 +19,9 @@ test-docs: $(VENV)/installed-dev  ## Run what the pages and examples show, and c
 test-slow: $(VENV)/installed-dev  ## Run the longer checks
 	$(BIN)/pytest -m slow -n 2 --dist worksteal
 
-test-study: $(VENV)/installed-dev  ## Play in a real browser: keys, touch, reloads, a killed server
+test-study: $(VENV)/installed-dev  ## Play in a real browser, and record in PostgreSQL
 	.ci/install_browser
+	.ci/install_postgresql
 	$(BIN)/pytest -m study tests/study
 
 lint: $(VENV)/installed-dev $(VENV)/installed-docs  ## Check style, types and which way imports point

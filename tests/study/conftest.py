@@ -40,7 +40,7 @@ def postgresql():
         yield running
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.study)])
 def store(request, tmp_path):
     """Where records may be, empty: a file, or a database of its own."""
     if request.param == "sqlite":

@@ -212,6 +212,7 @@ def test_whoever_reads_keeps_no_writer_out(writing):
     engine.dispose()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("how", [FAST, AT_ONCE])
 def test_a_database_that_was_away_has_all_that_was_promised(how):
     with database() as server:

@@ -17,8 +17,15 @@ from qbumpers.imports import import_modules
 study = typer.Typer(help="Look after what was played in the browser.", no_args_is_help=True)
 application.add_typer(study, name="study")
 
+_RECORDS = "play.sqlite"  # in the folder of --out
 _DEFAULT = ("stochastic-q-bumpers", {"alpha": 0.5})
 
+Records = Annotated[
+    str,
+    typer.Argument(
+        help="What play recorded: a file, or the URL of a PostgreSQL database.", metavar="RECORDS"
+    ),
+]
 Alpha = Annotated[
     float | None,
     typer.Option(help="How much the assistant leaves to you.", metavar="SHARE"),
@@ -58,6 +65,14 @@ def play(
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
     ] = Path("results/play"),
+    records: Annotated[
+        str | None,
+        typer.Option(
+            help="PostgreSQL database for the record, which several servers may share.",
+            show_default="a file in the folder of --out",
+            metavar="URL",
+        ),
+    ] = None,
     imports: Imports = None,
 ) -> None:
     """Play a task in the browser, with an assistant.
@@ -71,6 +86,7 @@ def play(
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
     from qbumpers.study.setup import Setup
+    from qbumpers.study.stores import place_of
 
     options = dict(_options_in(context.args))
     if alpha is not None:
@@ -80,15 +96,27 @@ def play(
     else:
         choice = Choice(assistant or _DEFAULT[0], options)
     setup = Setup(task, values, discount=discount)
+    place = _database_at(records) if records is not None else out / _RECORDS
+
+    def announce(url: str) -> None:
+        OUTPUT.print(f"Play at [bold]{url}[/bold]", soft_wrap=True)
+        where = escape(place_of(place))
+        OUTPUT.print(f"The record goes into {where}; Ctrl-C ends it.", soft_wrap=True)
+
     try:
-        serve(setup, choice, out, port=port, browser=browser, announce=_announce)
+        serve(setup, choice, place, port=port, browser=browser, announce=announce)
     except KeyboardInterrupt:
         OUTPUT.print("\nStopped; what was played is kept.")
 
 
-def _announce(url: str, records: Path) -> None:
-    OUTPUT.print(f"Play at [bold]{url}[/bold]", soft_wrap=True)
-    OUTPUT.print(f"The record goes into {escape(str(records))}; Ctrl-C ends it.", soft_wrap=True)
+def _database_at(records: str) -> str:
+    from qbumpers.study.stores import is_url
+
+    if not is_url(records):
+        raise RequestError(
+            f"records = {records!r}; postgresql://USER@HOST/DATABASE is needed, or --out for a file"
+        )
+    return records
 
 
 def _options_in(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
@@ -115,7 +143,7 @@ def _value_of(text: str) -> Any:
 
 @study.command("replay")
 def replay_records(
-    file: Annotated[Path, typer.Argument(help="What play recorded.", metavar="FILE")],
+    records: Records,
     imports: Imports = None,
 ) -> None:
     """Decide recorded sessions again, and say whether anything comes out differently.
@@ -127,7 +155,7 @@ def replay_records(
     from qbumpers.study.replaying import replay_file
 
     different = 0
-    for found in replay_file(file):
+    for found in replay_file(records):
         sizes = f"{counted(found.episodes, 'episode')}, {counted(found.steps, 'step')}"
         verdict = f"different: {found.difference}" if found.difference else "OK"
         line = f"{found.session} {found.task}: {sizes}: {verdict}"

@@ -21,14 +21,19 @@ def is_url(records: str | Path) -> bool:
     return "://" in str(records)
 
 
-def shown(records: str | Path) -> str:
-    """Records as messages name them, without a password."""
+def place_of(records: str | Path) -> str:
+    """Where records are, without a password."""
     if not is_url(records):
-        return f"records file {records}"
+        return str(records)
     try:
-        return f"records {sql.make_url(str(records)).render_as_string()}"
-    except ArgumentError:
-        return "records"
+        return sql.make_url(str(records)).render_as_string()
+    except (ArgumentError, ValueError):
+        return "postgresql://..."
+
+
+def shown(records: str | Path) -> str:
+    """Records as messages name them."""
+    return f"records {place_of(records)}" if is_url(records) else f"records file {records}"
 
 
 def engine_of(records: str | Path, *, new: bool) -> sql.Engine:
@@ -74,7 +79,7 @@ def _postgresql(url: str) -> sql.Engine:
         )
     except (ArgumentError, ValueError) as error:
         raise RequestError(
-            "records postgresql://...: not a URL; postgresql://USER@HOST/DATABASE is needed"
+            f"{shown(url)}: not a URL; postgresql://USER@HOST/DATABASE is needed"
         ) from error
     except (NoSuchModuleError, ImportError) as error:
         raise RequestError(
