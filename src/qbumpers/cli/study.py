@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -13,6 +13,9 @@ from qbumpers.cli.console import OUTPUT
 from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError, counted
 from qbumpers.imports import import_modules
+
+if TYPE_CHECKING:
+    from qbumpers.experiments.participants import Exported
 
 study = typer.Typer(help="Look after what was played in the browser.", no_args_is_help=True)
 application.add_typer(study, name="study")
@@ -163,6 +166,50 @@ def replay_records(
         different += bool(found.difference)
     if different:
         raise typer.Exit(1)
+
+
+@study.command("export")
+def export(
+    records: Records,
+    out: Annotated[Path, typer.Option(help="Folder for the files.", metavar="DIR")],
+    imports: Imports = None,
+) -> None:
+    """Write what was played as an experiment's files, a participant in the place of a trial.
+
+    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them.
+
+    Example: qbumpers study export results/play/play.sqlite --out results/played
+    """
+    _check_installed()
+    import_modules(imports or (), "--import")
+    from qbumpers.experiments.participants import STEPS, export_records
+
+    for found in export_records(records, out):
+        OUTPUT.print(
+            f"[bold]{escape(found.task)}[/bold]: {counted(found.participants, 'participant')}, "
+            f"{counted(found.episodes, 'episode')}, into {escape(str(found.folder))}",
+            soft_wrap=True,
+        )
+        for text in _unfinished(found):
+            OUTPUT.print(text, soft_wrap=True)
+        OUTPUT.print(f"  qbumpers fit {escape(str(found.folder / STEPS))}", soft_wrap=True)
+        if found.pairs:
+            OUTPUT.print(f"  qbumpers report {escape(str(found.folder))}", soft_wrap=True)
+
+
+def _unfinished(found: "Exported") -> Iterator[str]:
+    """What is not in the tables of a report, in sentences."""
+    if not found.pairs:
+        yield "No unassisted episode follows an assisted one: there is nothing for a report."
+    elif found.unpaired:
+        yield (
+            f"{counted(found.unpaired, 'episode')} not in the report, which compares each assisted "
+            "episode with the unassisted one after it; played.parquet has all."
+        )
+    if found.unfinished:
+        yield f"{counted(found.unfinished, 'episode')} did not end: steps are there, returns not."
+    if found.idle:
+        yield f"{counted(found.idle, 'session')} without a step."
 
 
 def _check_installed() -> None:

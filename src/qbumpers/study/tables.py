@@ -246,6 +246,11 @@ class Recorded(NamedTuple):
     setup: dict[str, Any]
     played: list[Played]
 
+    @property
+    def steps(self) -> list[Step]:
+        """All steps, in their order."""
+        return [step for played in self.played for step in played.steps]
+
 
 def sessions_in(engine: sql.Engine) -> list[str]:
     """Identifiers of every session, the earliest first."""
@@ -282,3 +287,19 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
         for row in connection.execute(steps).mappings():
             played[int(row["episode"])].steps.append(step_of_row(row))
     return Recorded(session, int(found["seed"]), json.loads(found["setup"]), played)
+
+
+def read_times(engine: sql.Engine, session: str) -> list[dict[str, Any]]:
+    """The device and the times of each step of a session, in their order, see `TIMES`."""
+    columns = (STEPS.c.device, *(STEPS.c[name] for name in TIMES))
+    with reading(engine) as connection:
+        order = sql.select(*columns).where(STEPS.c.session == session).order_by(STEPS.c.number)
+        return [dict(row) for row in connection.execute(order).mappings()]
+
+
+def read_notes(engine: sql.Engine, session: str) -> list[dict[str, Any]]:
+    """What else happened in a session: `session`, `time`, `kind`, and `content` as JSON."""
+    columns = (NOTES.c.session, NOTES.c.time, NOTES.c.kind, NOTES.c.content)
+    with reading(engine) as connection:
+        order = sql.select(*columns).where(NOTES.c.session == session).order_by(NOTES.c.note)
+        return [dict(row) for row in connection.execute(order).mappings()]
