@@ -25,6 +25,7 @@ from websockets.typing import Origin
 from qbumpers.study.connection import AGAIN, TAKEN_OVER
 from qbumpers.study.replaying import replay_session
 from qbumpers.study.tables import open_records, read_session, read_times, sessions_in
+from tests.narrowing import present
 from tests.study.postgresql import AT_ONCE, FAST, database
 from tests.study.serving import Process
 
@@ -173,7 +174,7 @@ def differences(store, pages):
     found, steps = [problem for page in pages for problem in page.problems], 0
     by_token = {page.token.partition(".")[0]: page for page in pages}
     for session in sessions_in(engine):
-        recorded = read_session(engine, session)
+        recorded = present(read_session(engine, session))
         replayed = replay_session(recorded)
         if replayed.difference:
             found.append(f"{session}: {replayed.difference}")
@@ -256,7 +257,7 @@ def soak(kind, minutes):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(description="Play for long while everything fails.")
     parser.add_argument("--minutes", type=float, default=30, help="in all, shared by the stores")
     parser.add_argument("--store", choices=STORES, action="append", help="both if left out")
     given = parser.parse_args()

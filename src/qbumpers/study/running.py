@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable
@@ -15,6 +16,10 @@ from qbumpers.study.messages import MOST_BYTES
 from qbumpers.study.server import Sessions, make_application
 from qbumpers.study.setup import Setup
 from qbumpers.study.tables import open_records
+
+_SWITCHES = 0.001
+"""Seconds after which a thread that waits gets its turn: steps wait for the thread of the records
+and it for them, and Python's 5 ms would be a quarter of a step at 50 Hz."""
 
 
 def play(
@@ -49,7 +54,18 @@ def play(
         announce(url)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
-        uvicorn.Server(configuration(make_application(sessions, hosts))).run([listening])
+        serve_until_stopped(make_application(sessions, hosts), listening)
+
+
+def serve_until_stopped(application: object, listening: socket.socket) -> None:
+    """Serve an application in this process, which does nothing else.
+
+    Args:
+        application: an ASGI application.
+        listening: socket that listens already.
+    """
+    sys.setswitchinterval(_SWITCHES)
+    uvicorn.Server(configuration(application)).run([listening])
 
 
 def configuration(application: object) -> uvicorn.Config:
