@@ -58,13 +58,13 @@ class Times(NamedTuple):
     keys: list[float]
 
 
-class Episode(msgspec.Struct):
+class Episode(msgspec.Struct, frozen=True):
     """What this needs of an episode."""
 
     over: bool
 
 
-class Last(msgspec.Struct):
+class Last(msgspec.Struct, frozen=True):
     """What this needs of a step."""
 
     proposed: int

@@ -248,9 +248,7 @@ class Player:
     async def _show(self) -> None:
         game = self._game
         turns = self._display.rate == 0
-        seen = turns or not game.episodes[-1].length % _VIEW_EVERY
-        surprising = game.last is not None and bool(game.last.overridden)
-        with_view = seen or surprising or not game.playing
+        with_view = turns or not game.episodes[-1].length % _VIEW_EVERY or not game.playing
         await self._send("state", **state_view(game, with_view=with_view))
 
     async def _send(self, kind: str, **fields: Any) -> None:

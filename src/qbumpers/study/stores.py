@@ -14,6 +14,7 @@ from qbumpers.errors import RequestError
 
 _SCHEMES = ("postgresql://", "postgres://")
 _CONNECTING = 5  # seconds until a database that does not answer counts as absent
+_MOST_PAGES = 16_000  # of the log until a commit waits for them: a flusher comes before
 _READS = "reads"  # execution option of SQLite connections that write nothing
 
 
@@ -95,7 +96,12 @@ def is_postgresql(bind: sql.Engine | sql.Connection) -> bool:
 
 def _prepare(connection: Any, _: Any) -> None:
     connection.isolation_level = None  # SQLAlchemy begins transactions, not Python's module
-    for setting in ("journal_mode = WAL", "synchronous = NORMAL", "busy_timeout = 5000"):
+    for setting in (
+        "journal_mode = WAL",
+        "synchronous = NORMAL",
+        "busy_timeout = 5000",
+        f"wal_autocheckpoint = {_MOST_PAGES}",
+    ):
         connection.execute(f"PRAGMA {setting}")
 
 
@@ -155,26 +161,20 @@ class Channel:
     def __init__(self, engine: sql.Engine) -> None:
         self._engine = engine
         self._connection: sql.Connection | None = None
-        self._lasting: bool | None = None
 
     @contextlib.contextmanager
     def transaction(self, *, lasting: bool) -> Generator[sql.Connection, None, None]:
         """A transaction, which is committed at the end.
 
         Args:
-            lasting: whether what is committed must survive also a power cut; otherwise, the end of
-                this process however it comes. PostgreSQL flushes everything at once unless it is
-                set up to flush late.
+            lasting: whether PostgreSQL must flush what is committed, as it does unless it is set up
+                to flush late. For a SQLite file, see `qbumpers.study.flushing`.
 
         Yields:
             Its connection.
         """
         connection = self._connection = self._connection or self._engine.connect()
         try:
-            if not is_postgresql(connection) and lasting != self._lasting:
-                raw: Any = connection.connection.dbapi_connection
-                raw.execute(f"PRAGMA synchronous = {'FULL' if lasting else 'NORMAL'}")
-                self._lasting = lasting
             with connection.begin():
                 if lasting and is_postgresql(connection):
                     connection.exec_driver_sql("SET LOCAL synchronous_commit = on")
@@ -185,7 +185,7 @@ class Channel:
 
     def close(self) -> None:
         """Give the connection back; the next transaction has another one."""
-        connection, self._connection, self._lasting = self._connection, None, None
+        connection, self._connection = self._connection, None
         if connection is not None:
             connection.close()
 

@@ -10,6 +10,7 @@ import sqlalchemy as sql
 from sqlalchemy.exc import OperationalError
 
 from qbumpers.errors import RequestError
+from qbumpers.study.flushing import Flusher
 from qbumpers.study.stores import Channel, insert, is_postgresql, share_locks
 from qbumpers.study.tables import Tenure, latest_tenures
 
@@ -43,6 +44,7 @@ class Writer:
 
     def __init__(self, engine: sql.Engine) -> None:
         self._engine, self._channel = engine, Channel(engine)
+        self._flusher = None if is_postgresql(engine) else Flusher(engine)
         self._waiting: queue.SimpleQueue[_Addition | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="records", daemon=True)
         self._thread.start()
@@ -83,6 +85,8 @@ class Writer:
                 for addition in group:  # one that fails must not take others with it
                     self._committed([addition], last=True)
         self._channel.close()
+        if self._flusher is not None:
+            self._flusher.close()
 
     def _group(self) -> tuple[list[_Addition], bool]:
         """What is waiting now, and whether the end has come."""
@@ -112,7 +116,10 @@ class Writer:
                 return False
         else:
             for addition in group:
-                addition.done.set_result(None)
+                if addition.lasting and self._flusher is not None:
+                    self._flusher.flush(addition.done)
+                else:
+                    addition.done.set_result(None)
         return True
 
 
