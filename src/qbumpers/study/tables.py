@@ -170,7 +170,7 @@ def take_session(engine: sql.Engine, session: str) -> Tenure | None:
 def drives(engine: sql.Engine, tenure: Tenure) -> bool:
     """Whether nobody has taken a session since."""
     with reading(engine) as connection:
-        return latest_tenures(connection, [tenure.session])[tenure.session] == tenure.number
+        return latest_tenures(connection, [tenure.session]).get(tenure.session) == tenure.number
 
 
 def latest_tenures(connection: sql.Connection, sessions: Sequence[str]) -> dict[str, int]:
