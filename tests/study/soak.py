@@ -243,9 +243,6 @@ def soak(kind, minutes):
             servers.append(Process(task, "--assistant", "none", *place))
             stack.callback(servers[-1].kill)
         pages, counts = asyncio.run(played(servers, server, minutes))
-        for each in servers:
-            each.interrupt()
-            each.start()  # what is stopped in the end must be there
         steps, found = differences(store, pages)
     connections = sum(page.connections for page in pages)
     shown = sum(len(page.seen) for page in pages)
