@@ -20,6 +20,8 @@ pytest.importorskip("starlette", reason="the extra study is not installed")
         (["cliff-walking", "--port", "99999"], "port = 99999"),
         (["cliff-walking", "--host", "192.0.2.1"], "host = 192.0.2.1: that is another address"),
         (["cliff-walking", "--behind-proxy", "example.org"], "behind-proxy = 'example.org'; a URL"),
+        (["cliff-walking", "--records", "a.sqlite"], "records = 'a.sqlite'; postgresql://USER@HO"),
+        (["cliff-walking", "--records", "mysql://me@there/x"], "records of mysql://: a file, or p"),
         (
             ["cliff-walking", "--assistant", "trajectory-bumpers", "--path=a.csv", "--reach=1"],
             "input should be a valid tuple",

@@ -88,3 +88,20 @@ def pages(browser):
         context.close()
     # A server that is gone is what some tests are about.
     assert [text for text in wrong if "ERR_CONNECTION" not in text] == []
+
+
+@pytest.fixture(scope="session")
+def postgresql():
+    """A PostgreSQL server that no test stops."""
+    from tests.study.postgresql import database
+
+    with database() as running:
+        yield running
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.study)])
+def store(request, tmp_path):
+    """Where records may be, empty: a file, or a database of its own."""
+    if request.param == "sqlite":
+        return str(tmp_path / "folder" / "play.sqlite")
+    return request.getfixturevalue("postgresql").new()

@@ -51,10 +51,11 @@ def served(setup, choice, path, second=0.01, also=()):
 
 def replayed(path):
     """The address, with a path, of a server that shows what is recorded."""
-    from qbumpers.study.replaying import records_at, replay_file
+    from qbumpers.study.replaying import replay_file
     from qbumpers.study.showing import Showing, make_showing
+    from qbumpers.study.tables import open_records
 
-    showing = Showing(records_at(path), list(replay_file(path)))
+    showing = Showing(open_records(path, new=False), list(replay_file(path)))
     return running(lambda address: make_showing(showing, [address], "secret"))
 
 

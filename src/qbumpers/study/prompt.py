@@ -87,7 +87,13 @@ class PromptSocket(WebSocketsSansIOProtocol):
         self.loop.call_later(_CLOSED_WITHIN, self.transport.abort)
 
 
-class PromptLoop(asyncio.SelectorEventLoop):
+if sys.platform == "win32":
+    _Loop = asyncio.SelectorEventLoop
+else:
+    from uvloop import Loop as _Loop
+
+
+class PromptLoop(_Loop):
     """A loop whose TLS handshakes must be done as soon as a request must be there."""
 
     async def create_server(self, *arguments: Any, **named: Any) -> Any:

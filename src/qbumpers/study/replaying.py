@@ -36,33 +36,22 @@ class Replayed(NamedTuple):
     difference: str
 
 
-def replay_file(path: str | Path, sessions: Sequence[str] = ()) -> Iterator[Replayed]:
-    """Hold rule and task to the sessions of a records file.
+def replay_file(records: str | Path, sessions: Sequence[str] = ()) -> Iterator[Replayed]:
+    """Hold rule and task to the sessions of records.
 
     Args:
-        path: of the file.
+        records: as `open_records` takes them.
         sessions: identifiers of those that are meant; all if there are none.
 
     Yields:
         What became of each.
 
     Raises:
-        RequestError: if it is no records file, or has no such session; before the first one.
+        RequestError: as `open_records`, or if there is no such session; before the first one.
     """
-    engine = records_at(path)
+    engine = open_records(records, new=False)
     chosen = chosen_sessions(engine, sessions)
     return _replayed(engine, chosen)
-
-
-def records_at(path: str | Path) -> sql.Engine:
-    """The records in a file that must be there.
-
-    Raises:
-        RequestError: if it is not, or is no records file.
-    """
-    if not Path(path).is_file():
-        raise RequestError(f"records file {path}: there is none")
-    return open_records(path)
 
 
 def chosen_sessions(engine: sql.Engine, sessions: Sequence[str]) -> list[str]:

@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import socket
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable
@@ -19,28 +21,29 @@ from qbumpers.study.setup import Setup
 from qbumpers.study.showing import Showing, make_showing, new_secret
 from qbumpers.study.tables import open_records
 
-RECORDS = "play.sqlite"
-"""Name of the records file in its folder."""
+_SWITCHES = 0.001
+"""Seconds after which a thread that waits gets its turn: steps wait for the thread of the records
+and it for them, and Python's 5 ms would be a quarter of a step at 50 Hz."""
 
 
 def play(
     setup: Setup,
     choice: Choice,
-    folder: Path,
+    records: str | Path,
     *,
     address: Address,
     browser: bool,
-    announce: Callable[[str, Path], None],
+    announce: Callable[[str], None],
 ) -> None:
     """Serve a task until Ctrl-C.
 
     Args:
         setup: what is played.
         choice: who assists unless the participant chooses.
-        folder: of the records.
+        records: where they are, as `open_records` takes them.
         address: where to listen, see `Address.check`.
         browser: whether to open the page in a browser.
-        announce: is called with the page's URL and the records file before anyone is served.
+        announce: is called with the page's URL before anyone is served.
 
     Raises:
         RequestError: if the address is refused or in use, the assistant does not suit the task, or
@@ -48,13 +51,12 @@ def play(
     """
     address.check()
     Game(setup, 0).begin(choice)
-    path = folder / RECORDS
 
     def make(hosts: list[str]) -> Any:
-        sessions = Sessions(setup, choice, open_records(path))
+        sessions = Sessions(setup, choice, open_records(records))
         return make_application(sessions, hosts, address.scheme)
 
-    serve(make, address, browser=browser, announce=lambda url: announce(url, path))
+    serve(make, address, browser=browser, announce=announce)
 
 
 def show(showing: Showing, *, port: int, browser: bool, announce: Callable[[str], None]) -> None:
@@ -104,10 +106,24 @@ def serve(
         announce(url)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
-        server = uvicorn.Server(configuration(application, address))
-        allow_connections()
-        with asyncio.Runner(loop_factory=PromptLoop) as runner:
-            runner.run(server.serve([listening]))
+        serve_until_stopped(application, listening, address)
+
+
+def serve_until_stopped(
+    application: object, listening: socket.socket, address: Address | None = None
+) -> None:
+    """Serve an application in this process, which does nothing else.
+
+    Args:
+        application: an ASGI application.
+        listening: socket that listens already.
+        address: with its certificate, if it has one.
+    """
+    sys.setswitchinterval(_SWITCHES)
+    allow_connections()
+    server = uvicorn.Server(configuration(application, address))
+    with asyncio.Runner(loop_factory=PromptLoop) as runner:
+        runner.run(server.serve([listening]))
 
 
 def configuration(application: object, address: Address | None = None) -> uvicorn.Config:
