@@ -190,14 +190,14 @@ def _scratch_words(condition: Condition) -> int:
 
 def _calls(functions: list[Any], wanted: Any) -> bool:
     """Whether one of some functions calls another one, if only by way of others."""
-    waiting, seen = [*map(uncompiled, functions)], set[int]()
+    waiting, seen = functions, set[int]()
     while waiting:
-        function = waiting.pop()
+        function: Any = uncompiled(waiting.pop())
         if function is wanted:
             return True
-        code = getattr(function, "__code__", None)
+        code: Any = getattr(function, "__code__", None)
         if code is not None and id(function) not in seen:
             seen.add(id(function))
             names = [name for name, _ in global_names(code)]
-            waiting += [uncompiled(function.__globals__.get(name)) for name in names]
+            waiting = waiting + [function.__globals__.get(name) for name in names]
     return False

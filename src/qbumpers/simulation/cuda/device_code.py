@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import cuda as numba_cuda
 from numba import types as numba_types
 from numba.cuda import cgutils  # pyright: ignore[reportAttributeAccessIssue]
-from numba.cuda.extending import intrinsic, overload
+from numba.cuda.extending import intrinsic, overload  # pyright: ignore[reportAttributeAccessIssue]
 from numba.cuda.np import arrayobj  # pyright: ignore[reportMissingImports]
 
 from qbumpers import borrowing

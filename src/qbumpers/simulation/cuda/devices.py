@@ -4,6 +4,7 @@ import importlib.util
 import re
 from typing import Any, Literal, NamedTuple, get_args
 
+from qbumpers.compilation import compiles
 from qbumpers.errors import RequestError, unknown_name
 
 PROCESSOR, GPU = "processor", "gpu"
@@ -69,6 +70,8 @@ def _check(device: str, number: int) -> None:
 
     if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
         return
+    if not compiles():
+        raise RequestError(f"{where}: with NUMBA_DISABLE_JIT=1 nothing is compiled for it")
     cards = _cards(where, cuda)
     if number >= cards:
         raise RequestError(f"{where}: there are {cards} cards here, counted from 0")
@@ -84,5 +87,5 @@ def _cards(where: str, cuda: Any) -> int:
     try:
         return len(cuda.gpus)
     except cuda.CudaSupportError as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error).split()).rstrip(" :")
         raise RequestError(f"{where}: no NVIDIA card can be used here: {reason}") from error
