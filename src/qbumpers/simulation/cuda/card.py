@@ -8,7 +8,7 @@ import contextlib
 import functools
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -60,24 +60,20 @@ def free_bytes(card: Card) -> int:
         return int(cuda.current_context().get_memory_info().free)
 
 
-def own_arrays(groups: int) -> Callable[[Far], Far]:
-    """What makes, of an array that a trial begins with, those of all trials of a block.
+def own_arrays(first: np.ndarray, groups: int) -> Far:
+    """Arrays of all trials of a block, each of which holds what a trial begins with.
 
     Args:
+        first: what that is.
         groups: of `LANES` trials.
     """
-
-    def made(far: Far) -> Far:
-        first = far.arrays
-        shape = (groups, *first.shape, LANES)
-        if SIMULATED:
-            return Far(np.broadcast_to(first[..., None], shape).copy())
-        arrays = cuda.device_array(math.prod(shape), first.dtype)
-        blocks = -(-arrays.size // THREADS)
-        _spread[blocks, THREADS](cuda.to_device(first.reshape(-1)), arrays)
-        return Far(arrays.reshape(shape))
-
-    return made
+    shape = (groups, *first.shape, LANES)
+    if SIMULATED:
+        return Far(np.broadcast_to(first[..., None], shape).copy())
+    arrays = cuda.device_array(math.prod(shape), first.dtype)
+    blocks = -(-arrays.size // THREADS)
+    _spread[blocks, THREADS](cuda.to_device(first.reshape(-1)), arrays)
+    return Far(arrays.reshape(shape))
 
 
 @cuda.jit

@@ -12,6 +12,8 @@ from numba import cuda as numba_cuda
 from numba import types as numba_types
 from numba.cuda import cgutils  # pyright: ignore[reportAttributeAccessIssue]
 from numba.cuda.extending import intrinsic, overload  # pyright: ignore[reportAttributeAccessIssue]
+from numba.cuda.core import ir as ir_of_numba  # pyright: ignore[reportMissingImports]
+from numba.cuda.core import ir_utils  # pyright: ignore[reportMissingImports]
 from numba.cuda.np import arrayobj  # pyright: ignore[reportMissingImports]
 
 from qbumpers import borrowing
@@ -24,6 +26,19 @@ types: Any = numba_types
 
 _SHARED_MEMORY = 3  # address space
 _SETTINGS: dict[str, Any] = {"target": "cuda", "strict": False, "inline": "always"}
+
+# Where a function is inlined, the compiler leaves out what is stored into an array that it takes for
+# the caller's alone, and does not know that rows and views are parts of others. So all is kept.
+
+
+def _keep_stores(statement: Any, *about: Any) -> None:
+    """Note that others see what a statement stores; see `find_potential_aliases` of Numba."""
+    *_, seen_by_others = about
+    seen_by_others.add(statement.target.name)
+
+
+for _kind in ir_of_numba.setitem_types:
+    ir_utils.alias_analysis_extensions[_kind] = _keep_stores
 
 
 @overload(borrowing.borrow, **_SETTINGS)

@@ -1,7 +1,7 @@
 """Trials on a card, block by block; a trial that comes to no end there is left to the processor."""
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,40 +141,61 @@ def _numbers(block: list[_Part]) -> list[int]:
     return list(itertools.chain.from_iterable(part.trials for part in block))
 
 
-def _run(condition: Condition, begun: Begun, block: list[_Part], seed: int, card: Card) -> _Ran:
-    """Run a block of trials, however each of them ends."""
-    sizes = [len(part.trials) for part in block]
+def kernel_arguments(
+    condition: Condition, begun: Begun, groups: Sequence[range], seed: int, own: Callable[..., Far]
+) -> tuple[Any, ...]:
+    """What the kernel takes for a block of trials.
+
+    Args:
+        condition: what is simulated.
+        begun: what its trials begin with.
+        groups: which trials, one range after another.
+        seed: the experiment's, for the random streams.
+        own: makes, of an array that a trial begins with and the number of groups of `LANES` trials,
+            those of all trials.
+
+    Returns:
+        Its arguments, in arrays of the processor but for those that `own` makes.
+    """
+    sizes = [len(group) for group in groups]
     trials, states = sum(sizes), condition.task.states
+    parts = begun.learner, begun.minds, begun.counts, begun.record
+    whole = -(-trials // LANES)
+    learner, minds, counts, record = changed(Far, lambda far: own(far.arrays, whole), parts)
     # Trials are innermost in memory: threads that run in step write side by side.
     outcomes = Outcomes(*map(np.asfortranarray, outcome_room(condition, trials)))
     found = Found(
-        StateCounts(*(np.zeros((len(block), states), np.int64) for _ in range(3))),
-        np.repeat(np.arange(len(block), dtype=np.int32), sizes),
+        StateCounts(*(np.zeros((len(groups), states), np.int64) for _ in range(3))),
+        np.repeat(np.arange(len(groups), dtype=np.int32), sizes),
         np.zeros(trials, np.uint8),
     )
-    drawn = np.concatenate([streams(condition, part.trials, seed) for part in block])
+    drawn = np.concatenate([streams(condition, group, seed) for group in groups])
+    return (
+        begun.dynamics, begun.assistance, learner, minds, (drawn,), begun.retention,
+        Sinks(outcomes, counts, record, None), found,
+    )  # fmt: skip
+
+
+def _run(condition: Condition, begun: Begun, block: list[_Part], seed: int, card: Card) -> _Ran:
+    """Run a block of trials, however each of them ends."""
+    groups = [part.trials for part in block]
     with cards.chosen(card):
-        own = cards.own_arrays(-(-trials // LANES))
-        parts = begun.learner, begun.minds, begun.counts, begun.record
-        learner, minds, counts, record = changed(Far, own, parts)
-        arguments = (
-            begun.dynamics, begun.assistance, learner, minds, (drawn,), begun.retention,
-            Sinks(outcomes, counts, record, None), found,
-        )  # fmt: skip
-        *_, sinks, kept = cards.launch(begun.space, arguments, trials)
-        results, kept, steps = cards.returned((sinks.outcomes, kept, sinks.record))
-    return _Ran(results, kept.totals, kept.finished, changed(Far, lambda far: far.arrays, steps))
+        arguments = kernel_arguments(condition, begun, groups, seed, cards.own_arrays)
+        *_, sinks, kept = cards.launch(begun.space, arguments, sum(map(len, groups)))
+        outcomes, found, record = cards.returned((sinks.outcomes, kept, sinks.record))
+    steps = changed(Far, lambda far: far.arrays, record)
+    return _Ran(outcomes, found.totals, found.finished, steps)
 
 
 def _finish(condition: Condition, block: list[_Part], seed: int, ran: _Ran) -> None:
     """Do what came to no end on the card: the processor raises what a card cannot, or does it."""
     numbers = _numbers(block)
+    groups = np.repeat(np.arange(len(block)), [len(part.trials) for part in block])
     for place in np.flatnonzero(ran.finished == 0).tolist():
         trials = range(numbers[place], numbers[place] + 1)
         alone = tabular.run_block(condition, trials, seed)
         for array, row in zip(ran.outcomes, alone.outcomes, strict=True):
             array[place] = row[0]
-        [group] = [g for g, part in enumerate(block) if trials.start in part.trials][:1]
-        assert alone.counts is not None
-        for array, counted in zip(ran.totals, alone.counts, strict=True):
+        group = groups[place]
+        for array, counted in zip(ran.totals, alone.counts or (), strict=True):
             array[group] += counted

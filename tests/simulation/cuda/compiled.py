@@ -1,0 +1,63 @@
+"""Kernels compiled for a card that is not there: to PTX, and to LLVM's code."""
+
+import contextlib
+import types
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import cuda
+from numba.cuda import dispatcher
+from numba.cuda.cudadrv import nvvm
+
+from qbumpers.simulation import Condition
+from qbumpers.simulation.cuda.block import Begun, begin
+from qbumpers.simulation.cuda.card import types_on_card
+from qbumpers.simulation.cuda.devices import Precision
+from qbumpers.simulation.cuda.engine import kernel_arguments
+from qbumpers.simulation.cuda.kernel import trial_of_thread
+from qbumpers.simulation.cuda.layout import LANES, Far
+
+COMPUTE_CAPABILITY = (9, 0)
+"""Of the cards that tests compile for."""
+
+
+class Kernel(NamedTuple):
+    """A kernel, with what it was compiled for."""
+
+    ptx: str
+    modules: list[str]
+    arguments: tuple[Any, ...]
+    kinds: tuple[Any, ...]
+    begun: Begun
+
+
+def own_arrays(first, groups):
+    return Far(np.broadcast_to(first[..., None], (groups, *first.shape, LANES)).copy())
+
+
+def compile_kernel(
+    condition: Condition, trials=range(2), precision: Precision = "float64", recorded=False, seed=5
+) -> Kernel:
+    begun = begin(condition, precision, recorded)
+    arguments = kernel_arguments(condition, begun, [trials], seed, own_arrays)
+    kinds = types_on_card(arguments)
+    with _without_card() as modules:
+        ptx, _ = cuda.compile_ptx(trial_of_thread(begun.space), kinds, cc=COMPUTE_CAPABILITY)
+    return Kernel(ptx, modules[-1], arguments, kinds, begun)
+
+
+@contextlib.contextmanager
+def _without_card():
+    """Say for which card functions are compiled, and keep what they are compiled from."""
+    device = types.SimpleNamespace(compute_capability=COMPUTE_CAPABILITY)
+    asked, compiled, modules = dispatcher.get_current_device, nvvm.compile_ir, []
+
+    def keep(code, **options):
+        modules.append(code)
+        return compiled(code, **options)
+
+    dispatcher.get_current_device, nvvm.compile_ir = lambda: device, keep
+    try:
+        yield modules
+    finally:
+        dispatcher.get_current_device, nvvm.compile_ir = asked, compiled
