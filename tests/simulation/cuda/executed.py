@@ -11,21 +11,31 @@ import llvmlite.binding as llvm
 import numpy as np
 from numba.core import types
 
+from qbumpers.decisions import Step
 from qbumpers.simulation.cuda.card import THREADS
+from qbumpers.simulation.cuda.layout import LANES
 
 _MATHS = {"exp": 1, "log": 1, "pow": 2, "fmax": 2, "fmin": 2, "floor": 1}
 _PLACES = ("tid.x", "ctaid.x")  # of a thread, and of its block
 _SCRATCH_WORDS = 3 * THREADS
+_POINTER = re.compile(r"(?:\b(?:i\d+|double|float|ptr)|\[[^][]*\]|\{[^{}]*\}) ?\*+")
 _OPENING = {")": "(", "]": "[", "}": "{"}
 
 
 def run_on_processor(kernel):
-    """Run every trial of a kernel; its arguments then hold what a card would have put there."""
+    """Run every trial of a kernel; its arguments then hold what a card would have put there.
+
+    Returns the outcomes, what else was found, and a table of steps per trial if they are kept.
+    """
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     whole = llvm.parse_assembly(_in_place_of_a_card())
     for text in kernel.modules:
         whole.link_in(llvm.parse_assembly(_for_processor(text)))
+    missing = {each.name for each in whole.functions if each.is_declaration}
+    known = {f"{name}{suffix}" for name in _MATHS for suffix in ("", "f")}
+    unknown = {name for name in missing - known if not name.startswith("llvm.")}
+    assert not unknown, f"a card has {sorted(unknown)}, but nothing is here in its place"
     [name] = re.findall(r"\.entry (\w+)", kernel.ptx)
     machine = llvm.Target.from_default_triple().create_target_machine(opt=0)
     with llvm.create_mcjit_compiler(whole, machine) as engine:
@@ -41,6 +51,19 @@ def run_on_processor(kernel):
         for trial in range(len(kernel.arguments[-1].finished)):
             block.value, thread.value = divmod(trial, THREADS)
             function(*arguments)
+    *_, sinks, found = kernel.arguments
+    return sinks.outcomes, found, steps_of_trials(sinks)
+
+
+def steps_of_trials(sinks):
+    """The steps that each trial took, cut out of what a block of trials has kept."""
+    if sinks.record is None:
+        return []
+    lengths = sinks.outcomes.assisted_length.sum(axis=1)
+    return [
+        Step(*(far.arrays[trial // LANES, :length, ..., trial % LANES] for far in sinks.record))
+        for trial, length in enumerate(lengths)
+    ]
 
 
 def _in_place_of_a_card():
@@ -53,12 +76,14 @@ def _in_place_of_a_card():
     for name, number in {"ntid.x": THREADS, "tid.y": 0, "tid.z": 0}.items():
         lines.append(f"define i32 @llvm_nvvm.{name}() {{ ret i32 {number} }}")
     for name, count in _MATHS.items():
-        kinds = ", ".join(["double"] * count)
-        named = ", ".join(f"double %{place}" for place in "ab"[:count])
-        lines += [
-            f"declare double @{name}({kinds})",
-            f"define double @__nv_{name}({named}) {{ %v = call double @{name}({named}) ret double %v }}",
-        ]
+        for kind, suffix in (("double", ""), ("float", "f")):
+            kinds = ", ".join([kind] * count)
+            named = ", ".join(f"{kind} %{place}" for place in "ab"[:count])
+            lines += [
+                f"declare {kind} @{name}{suffix}({kinds})",
+                f"define {kind} @__nv_{name}{suffix}({named}) {{",
+                f"%v = call {kind} @{name}{suffix}({named}) ret {kind} %v }}",
+            ]
     return "\n".join(lines)
 
 
@@ -74,15 +99,14 @@ def _for_processor(text):
 
 
 def _untyped(line):
-    """A line of code whose pointers say no more to what they point, as later versions of LLVM ask."""
-    found, quoted = "", False
-    for letter in line:
-        quoted ^= letter == '"'
-        if letter != "*" or quoted:
-            found += letter
-        elif not found.endswith("ptr"):
-            found = found[: _begin_of_type(found)] + "ptr"
-    return found
+    """A line of code whose pointers do not say to what they point, as later LLVMs want it."""
+    while "*" in line:
+        simple = _POINTER.sub("ptr", line)
+        if simple == line:
+            before, after = line.split("*", 1)
+            simple = before[: _begin_of_type(before)] + "ptr" + after
+        line = simple
+    return line
 
 
 def _begin_of_type(text):

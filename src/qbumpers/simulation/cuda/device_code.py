@@ -11,9 +11,9 @@ from llvmlite import ir
 from numba import cuda as numba_cuda
 from numba import types as numba_types
 from numba.cuda import cgutils  # pyright: ignore[reportAttributeAccessIssue]
-from numba.cuda.extending import intrinsic, overload  # pyright: ignore[reportAttributeAccessIssue]
 from numba.cuda.core import ir as ir_of_numba  # pyright: ignore[reportMissingImports]
 from numba.cuda.core import ir_utils  # pyright: ignore[reportMissingImports]
+from numba.cuda.extending import intrinsic, overload  # pyright: ignore[reportAttributeAccessIssue]
 from numba.cuda.np import arrayobj  # pyright: ignore[reportMissingImports]
 
 from qbumpers import borrowing
@@ -27,8 +27,8 @@ types: Any = numba_types
 _SHARED_MEMORY = 3  # address space
 _SETTINGS: dict[str, Any] = {"target": "cuda", "strict": False, "inline": "always"}
 
-# Where a function is inlined, the compiler leaves out what is stored into an array that it takes for
-# the caller's alone, and does not know that rows and views are parts of others. So all is kept.
+# Where a function is inlined, the compiler leaves out what is stored into an array of which it does
+# not know that others see it, and it does not know that of rows. So all stores are kept.
 
 
 def _keep_stores(statement: Any, *about: Any) -> None:

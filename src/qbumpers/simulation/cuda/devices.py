@@ -5,7 +5,7 @@ import re
 from typing import Any, Literal, NamedTuple, get_args
 
 from qbumpers.compilation import compiles
-from qbumpers.errors import RequestError, unknown_name
+from qbumpers.errors import RequestError, counted, unknown_name
 
 PROCESSOR, GPU = "processor", "gpu"
 
@@ -74,7 +74,8 @@ def _check(device: str, number: int) -> None:
         raise RequestError(f"{where}: with NUMBA_DISABLE_JIT=1 nothing is compiled for it")
     cards = _cards(where, cuda)
     if number >= cards:
-        raise RequestError(f"{where}: there are {cards} cards here, counted from 0")
+        verb = "is" if cards == 1 else "are"
+        raise RequestError(f"{where}: there {verb} {counted(cards, 'card')} here, counted from 0")
     driver, needed = cuda.driver.driver.get_version(), cuda.runtime.get_version()
     if driver[0] < needed[0]:
         raise RequestError(
