@@ -2,19 +2,25 @@
 
 import importlib.metadata
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Any, Protocol, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
-from qbumpers.compilation import compiles, compiling_together
+from qbumpers.compilation import compiles, compiling_together, shortened
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, whole_number
 from qbumpers.simulation import deep, tabular
 from qbumpers.simulation.condition import Condition, Setup, make_condition
-from qbumpers.simulation.cuda.devices import PROCESSOR, REVISION, Card, device_of
+from qbumpers.simulation.cuda.devices import (
+    PROCESSOR,
+    REVISION,
+    Card,
+    device_of,
+    why_not_compiled,
+)
 from qbumpers.simulation.outcomes import Script, Simulation, joined
 from qbumpers.simulation.workers import make_pool, some_finished
 from qbumpers.tasks import Task
@@ -111,7 +117,7 @@ def run_on_card(
     check_for_card(condition)
     from qbumpers.simulation.cuda.engine import run_groups
 
-    with _compiling(condition):
+    with _compiling(condition, "on a GPU", why_not_compiled):
         yield from run_groups(condition, groups, seed, card)
 
 
@@ -159,9 +165,11 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
         return engine_of(condition.task).run_block(condition, trials, seed)
 
 
-def _compiling(condition: Condition) -> AbstractContextManager[None]:
-    what = f"assistant {condition.assistant.name}, learner {condition.learner_type.name}"
-    return compiling_together(what)
+def _compiling(
+    condition: Condition, where: str = "", reason: Callable[[BaseException], str] = shortened
+) -> AbstractContextManager[None]:
+    parts = [f"assistant {condition.assistant.name}", f"learner {condition.learner_type.name}"]
+    return compiling_together(", ".join([*parts, where] if where else parts), reason)
 
 
 class Engine(Protocol):

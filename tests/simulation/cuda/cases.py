@@ -82,6 +82,23 @@ def register_raising():
     return make_assistant("raising")
 
 
+def register_allocating():
+    def allocating(situation, noise, options):
+        better = situation.values > situation.values[situation.proposed]
+        return Decision(situation.proposed, 0.0 if better.any() else 0.1)
+
+    register_assistant("allocating", NoOptions)(allocating)
+    return make_assistant("allocating")
+
+
+def register_sorting():
+    def sorting(situation, noise, options):
+        return Decision(situation.proposed, 0.0 * np.sort(situation.values)[0])
+
+    register_assistant("sorting", NoOptions)(sorting)
+    return make_assistant("sorting")
+
+
 def register_wrong_learner():
     def choose(settings, memory, state, rates, stream):
         return 9

@@ -1,5 +1,7 @@
 """Every kernel compiles to PTX; and what it is compiled from does what plain Python does."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,10 @@ from qbumpers.assistants import register_assistant  # noqa: E402
 from qbumpers.borrowing import scratch  # noqa: E402
 from qbumpers.compilation import compiles  # noqa: E402
 from qbumpers.decisions import Decision  # noqa: E402
+from qbumpers.errors import RequestError  # noqa: E402
 from qbumpers.learners import QLearner  # noqa: E402
 from qbumpers.learners.schedules import Schedule  # noqa: E402
-from qbumpers.simulation import make_condition, run, tabular  # noqa: E402
+from qbumpers.simulation import Card, make_condition, run, tabular  # noqa: E402
 from tests.assistants.examples import EXAMPLES  # noqa: E402
 from tests.simulation.cuda import cases  # noqa: E402
 from tests.simulation.cuda.cases import LAYERS, OF_STATES, SEED  # noqa: E402
@@ -21,7 +24,8 @@ from tests.simulation.cuda.cases import LAYERS, OF_STATES, SEED  # noqa: E402
 if not compiles():
     pytest.skip("in the simulator nothing is compiled", allow_module_level=True)
 
-from tests.simulation.cuda.compiled import compile_kernel  # noqa: E402
+from qbumpers.simulation.cuda import engine  # noqa: E402
+from tests.simulation.cuda.compiled import compile_kernel, own_arrays  # noqa: E402
 from tests.simulation.cuda.executed import run_on_processor  # noqa: E402
 
 TRIALS = range(2)
@@ -94,6 +98,27 @@ def test_a_trial_whose_learner_chooses_no_action_comes_to_no_end():
     condition = make_condition("cliff-walking", "none", learner=learner, episodes=3)
     _, found, _ = run_on_processor(compile_kernel(condition, TRIALS, seed=SEED))
     assert not found.finished.any()
+
+
+@pytest.mark.parametrize(
+    ("register", "message"),
+    [
+        (cases.register_allocating, "assistant allocating, .* on a GPU: .* decide makes an array"),
+        (cases.register_sorting, "assistant sorting, .* on a GPU: .* sort makes an array"),
+    ],
+)
+def test_a_rule_of_ones_own_that_makes_arrays_is_refused_in_words(register, message, monkeypatch):
+    condition = make_condition("cliff-walking", register(), episodes=1)
+
+    def compiled(space, arguments, trials):
+        compile_kernel(condition)
+
+    monkeypatch.setattr(engine.cards, "launch", compiled)
+    monkeypatch.setattr(engine.cards, "chosen", lambda card: contextlib.nullcontext())
+    monkeypatch.setattr(engine.cards, "free_bytes", lambda card: 1 << 30)
+    monkeypatch.setattr(engine.cards, "own_arrays", own_arrays)
+    with pytest.raises(RequestError, match=message):
+        run(condition, trials=1, card=Card())
 
 
 def test_a_trial_without_space_for_intermediate_results_comes_to_no_end():

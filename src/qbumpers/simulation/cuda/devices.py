@@ -4,7 +4,7 @@ import importlib.util
 import re
 from typing import Any, Literal, NamedTuple, get_args
 
-from qbumpers.compilation import compiles
+from qbumpers.compilation import compiles, shortened
 from qbumpers.errors import RequestError, counted, unknown_name
 
 PROCESSOR, GPU = "processor", "gpu"
@@ -90,3 +90,22 @@ def _cards(where: str, cuda: Any) -> int:
     except cuda.CudaSupportError as error:
         reason = " ".join(str(error).split()).rstrip(" :")
         raise RequestError(f"{where}: no NVIDIA card can be used here: {reason}") from error
+
+
+_NAMES = re.compile(r"Function\(<function ([a-z]\w*) at")
+_ALLOCATES = ("NRT required", "Only accept returning of array")
+
+
+def why_not_compiled(error: BaseException) -> str:
+    """What an error of the compiler for cards means, in words.
+
+    Args:
+        error: of Numba, which tells of every function on the way to what is wrong.
+    """
+    names = _NAMES.findall(str(error))
+    if names and any(phrase in str(error) for phrase in _ALLOCATES):
+        return (
+            f"{names[-1]} makes an array, which a GPU cannot; qbumpers.borrowing.scratch gives one "
+            "for a step"
+        )
+    return f"{names[-1]}: {shortened(error)}" if names else shortened(error)
