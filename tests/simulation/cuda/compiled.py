@@ -5,7 +5,7 @@ import types
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda
+from numba import cuda, typeof
 from numba.cuda import dispatcher
 from numba.cuda.cudadrv import nvvm
 
@@ -35,15 +35,28 @@ def own_arrays(first, groups):
     return Far(np.broadcast_to(first[..., None], (groups, *first.shape, LANES)).copy())
 
 
+def empty_array(shape, kind):
+    return np.zeros(shape, kind, order="F")
+
+
 def compile_kernel(
     condition: Condition, trials=range(2), precision: Precision = "float64", recorded=False, seed=5
 ) -> Kernel:
     begun = begin(condition, precision, recorded)
-    arguments = kernel_arguments(condition, begun, [trials], seed, own_arrays)
+    arguments = kernel_arguments(condition, begun, [trials], seed, own_arrays, empty_array)
     kinds = types_on_card(arguments)
     with _without_card() as modules:
         ptx, _ = cuda.compile_ptx(trial_of_thread(begun.space), kinds, cc=COMPUTE_CAPABILITY)
     return Kernel(ptx, modules[-1], arguments, kinds, begun)
+
+
+def compile_plain(plain: Any, kind: str) -> str:
+    """The kernel of benchmarks/plain_gpu.py."""
+    tables, found, steps = plain.tables(kind), np.zeros((2, 2)), np.zeros(2, np.int64)
+    kinds = tuple(map(typeof, (*tables, np.dtype(kind).type(0.7), 2, found, steps)))
+    with _without_card():
+        ptx, _ = cuda.compile_ptx(plain.make_kernel(kind).py_func, kinds, cc=COMPUTE_CAPABILITY)
+    return ptx
 
 
 @contextlib.contextmanager

@@ -8,7 +8,7 @@ import pytest
 
 from qbumpers import make_assistant, simulate
 from qbumpers.errors import RequestError
-from qbumpers.simulation import device_of, run, tabular
+from qbumpers.simulation import device_of, run
 from tests.assistants.examples import EXAMPLES
 from tests.simulation.cuda import cases
 from tests.simulation.cuda.cases import OF_STATES, SEED
@@ -30,17 +30,9 @@ def card():
 
 def parting(condition, trials, card):
     """Share of trials in which a step is another one than on the processor."""
-    from qbumpers.simulation.cuda.engine import records
+    from qbumpers.simulation.cuda.agreement import agreement
 
-    parted = 0
-    for trial, steps in enumerate(records(condition, range(trials), SEED, card)):
-        expected = tabular.record(condition, range(trial, trial + 1), SEED, None)
-        parted += not all(
-            len(steps.state) == len(expected.state)
-            and (getattr(steps, field) == getattr(expected, field)).all()
-            for field in ("state", "proposed", "executed", "overridden", "next_state", "events")
-        )
-    return parted / trials
+    return agreement(condition, trials, SEED, card).parted / trials
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -1,6 +1,8 @@
 """Every kernel compiles to PTX; and what it is compiled from does what plain Python does."""
 
 import contextlib
+import importlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,7 +27,12 @@ if not compiles():
     pytest.skip("in the simulator nothing is compiled", allow_module_level=True)
 
 from qbumpers.simulation.cuda import engine  # noqa: E402
-from tests.simulation.cuda.compiled import compile_kernel, own_arrays  # noqa: E402
+from tests.simulation.cuda.compiled import (
+    compile_kernel,
+    compile_plain,
+    empty_array,
+    own_arrays,
+)
 from tests.simulation.cuda.executed import run_on_processor  # noqa: E402
 
 TRIALS = range(2)
@@ -100,6 +107,13 @@ def test_a_trial_whose_learner_chooses_no_action_comes_to_no_end():
     assert not found.finished.any()
 
 
+@pytest.mark.parametrize("kind", ["float32", "float64"])
+def test_the_kernel_that_benchmarks_compare_with_compiles(kind, monkeypatch):
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")
+    plain = importlib.import_module("plain_gpu")
+    assert ".visible .entry" in compile_plain(plain, kind)
+
+
 @pytest.mark.parametrize(
     ("register", "message"),
     [
@@ -117,6 +131,7 @@ def test_a_rule_of_ones_own_that_makes_arrays_is_refused_in_words(register, mess
     monkeypatch.setattr(engine.cards, "chosen", lambda card: contextlib.nullcontext())
     monkeypatch.setattr(engine.cards, "free_bytes", lambda card: 1 << 30)
     monkeypatch.setattr(engine.cards, "own_arrays", own_arrays)
+    monkeypatch.setattr(engine.cards, "empty_array", empty_array)
     with pytest.raises(RequestError, match=message):
         run(condition, trials=1, card=Card())
 

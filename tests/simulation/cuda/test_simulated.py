@@ -4,6 +4,9 @@ They need a process of their own, with NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_
 """
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +25,9 @@ from qbumpers.experiments.plan import make_plan  # noqa: E402
 from qbumpers.experiments.work import finish  # noqa: E402
 from qbumpers.reproduction.experiments import reproduction  # noqa: E402
 from qbumpers.simulation import Card, make_condition, run, tabular  # noqa: E402
+from qbumpers.simulation.cuda import agreement as agreement_module  # noqa: E402
 from qbumpers.simulation.cuda import engine  # noqa: E402
+from qbumpers.simulation.cuda.agreement import agreement  # noqa: E402
 from qbumpers.tasks.corridors import vector_corridor  # noqa: E402
 from tests.assistants.examples import EXAMPLES  # noqa: E402
 from tests.simulation.cuda import cases  # noqa: E402
@@ -171,6 +176,31 @@ def test_results_of_a_card_are_used_again_by_a_card_alone(call, tmp_path):
         _, output, errors = call(*command, *other)
         assert "8 to run" in output
         assert "the precision was" in output + errors or "the processor was gpu" in output + errors
+
+
+def test_an_agreement_tells_where_trials_part(monkeypatch):
+    condition = cases.with_learner("q-learning")
+    assert agreement(condition, 3, SEED, CARD)[1] == 0
+    taken = list(engine.records(condition, range(3), SEED, CARD))
+    executed, probability = taken[1].executed.copy(), taken[2].probability.copy()
+    executed[4] += 1
+    probability[2] += 0.25
+    taken[1], taken[2] = (
+        taken[1]._replace(executed=executed), taken[2]._replace(probability=probability)
+    )  # fmt: skip
+    monkeypatch.setattr(agreement_module, "records", lambda *arguments: iter(taken))
+    found = agreement(condition, 3, SEED, CARD)
+    steps = len(taken[0].state) + 4 + len(taken[2].state)
+    assert found == (3, 1, steps, 1, 0.25)
+
+
+def test_the_script_that_measures_a_card_runs():
+    root = Path(__file__).parents[3]
+    command = [sys.executable, "docs/run_gpu.py", "--quick"]
+    finished = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    assert "0 of 2 trials part" in finished.stdout
+    assert "bumpers, float32" in finished.stdout
+    assert "4 points of 4 learners" in finished.stdout
 
 
 def test_numbers_are_kept_in_half_the_memory_if_that_is_asked_for():

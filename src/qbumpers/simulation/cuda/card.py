@@ -75,6 +75,11 @@ def own_arrays(first: np.ndarray, groups: int) -> Far:
     return Far(arrays.reshape(shape))
 
 
+def empty_array(shape: tuple[int, ...], kind: Any) -> Any:
+    """An array to be filled, its first axis innermost."""
+    return (np.zeros if SIMULATED else cuda.device_array)(shape, kind, order="F")
+
+
 @cuda.jit
 def _spread(first: Any, arrays: Any) -> None:
     """Fill arrays, laid out one after another with `LANES` innermost, with what one holds."""
@@ -88,7 +93,7 @@ def launch(space: Space, arguments: Any, trials: int) -> Any:
 
     Args:
         space: near memory of each trial.
-        arguments: of the kernel, arrays of the processor but for those of `own_arrays`.
+        arguments: of the kernel; arrays of the processor are sent to the card.
         trials: threads.
 
     Returns:

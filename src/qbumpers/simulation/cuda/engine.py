@@ -142,7 +142,12 @@ def _numbers(block: list[_Part]) -> list[int]:
 
 
 def kernel_arguments(
-    condition: Condition, begun: Begun, groups: Sequence[range], seed: int, own: Callable[..., Far]
+    condition: Condition,
+    begun: Begun,
+    groups: Sequence[range],
+    seed: int,
+    own: Callable[[np.ndarray, int], Far],
+    empty: Callable[[tuple[int, ...], Any], Any],
 ) -> tuple[Any, ...]:
     """What the kernel takes for a block of trials.
 
@@ -153,9 +158,10 @@ def kernel_arguments(
         seed: the experiment's, for the random streams.
         own: makes, of an array that a trial begins with and the number of groups of `LANES` trials,
             those of all trials.
+        empty: makes an array of a shape and type to be filled, its first axis innermost.
 
     Returns:
-        Its arguments, in arrays of the processor but for those that `own` makes.
+        Its arguments, in arrays of the processor but for those that `own` and `empty` make.
     """
     sizes = [len(group) for group in groups]
     trials, states = sum(sizes), condition.task.states
@@ -163,7 +169,8 @@ def kernel_arguments(
     whole = -(-trials // LANES)
     learner, minds, counts, record = changed(Far, lambda far: own(far.arrays, whole), parts)
     # Trials are innermost in memory: threads that run in step write side by side.
-    outcomes = Outcomes(*map(np.asfortranarray, outcome_room(condition, trials)))
+    room = outcome_room(condition, 0)
+    outcomes = Outcomes(*(empty((trials, *each.shape[1:]), each.dtype) for each in room))
     found = Found(
         StateCounts(*(np.zeros((len(groups), states), np.int64) for _ in range(3))),
         np.repeat(np.arange(len(groups), dtype=np.int32), sizes),
@@ -180,7 +187,9 @@ def _run(condition: Condition, begun: Begun, block: list[_Part], seed: int, card
     """Run a block of trials, however each of them ends."""
     groups = [part.trials for part in block]
     with cards.chosen(card):
-        arguments = kernel_arguments(condition, begun, groups, seed, cards.own_arrays)
+        arguments = kernel_arguments(
+            condition, begun, groups, seed, cards.own_arrays, cards.empty_array
+        )
         *_, sinks, kept = cards.launch(begun.space, arguments, sum(map(len, groups)))
         outcomes, found, record = cards.returned((sinks.outcomes, kept, sinks.record))
     steps = changed(Far, lambda far: far.arrays, record)
