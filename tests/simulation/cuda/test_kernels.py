@@ -27,7 +27,7 @@ if not compiles():
     pytest.skip("in the simulator nothing is compiled", allow_module_level=True)
 
 from qbumpers.simulation.cuda import engine  # noqa: E402
-from tests.simulation.cuda.compiled import (
+from tests.simulation.cuda.compiled import (  # noqa: E402
     compile_kernel,
     compile_plain,
     empty_array,
