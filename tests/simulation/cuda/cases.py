@@ -1,6 +1,6 @@
 """Conditions that need every part of what runs on a card, and rules and learners with errors."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from tests.assistants.examples import EXAMPLES
 
 SEED = 5
 OF_STATES = [name for name, learner in learners().items() if learner.observes == "states"]
-LAYERS = {
+LAYERS: dict[str, dict[str, Any]] = {
     "a share is forgotten": {"forgetting": 0.1, "motor": Motor(slip=0.2, lag=0.3)},
     "old practice is forgotten": {"forgetting": PowerLaw(), "retention": 1},
     "perception by chance": {"perception": Perception(0.4, "executed", 1.5)},
@@ -44,16 +44,20 @@ def with_rule(name, **setup):
     """A small trial with a rule of the package."""
     assistant = make_assistant(name, **EXAMPLES[name])
     task = next(task for task in small_tasks(assistant) if task.states)
-    given = {"values": small_values(task, assistant), "episodes": 3, "retention": 1, **setup}
+    given: dict[str, Any] = {
+        "values": small_values(task, assistant),
+        "episodes": 3,
+        "retention": 1,
+        **setup,
+    }
     return make_condition(task, assistant, **given)
 
 
 def with_learner(name, **setup):
     """A small trial at Cliff Walking with a kind of learner."""
     bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7)
-    return make_condition(
-        "cliff-walking", bumpers, **{"learner": make_learner(name), "episodes": 3, **setup}
-    )
+    given: dict[str, Any] = {"learner": make_learner(name), "episodes": 3, **setup}
+    return make_condition("cliff-walking", bumpers, **given)
 
 
 def register_wrong_action():

@@ -5,8 +5,9 @@ import types
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, typeof
-from numba.cuda import dispatcher
+from numba import cuda as numba_cuda
+from numba import typeof
+from numba.cuda import dispatcher as numba_dispatcher
 from numba.cuda.cudadrv import nvvm
 
 from qbumpers.simulation import Condition
@@ -16,6 +17,9 @@ from qbumpers.simulation.cuda.devices import Precision
 from qbumpers.simulation.cuda.engine import kernel_arguments
 from qbumpers.simulation.cuda.kernel import trial_of_thread
 from qbumpers.simulation.cuda.layout import LANES, Far
+
+cuda: Any = numba_cuda
+dispatcher: Any = numba_dispatcher
 
 COMPUTE_CAPABILITY = (9, 0)
 """Of the cards that tests compile for."""

@@ -6,6 +6,7 @@ processor, with a few functions in the place of what only a card has.
 
 import ctypes
 import re
+from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -14,6 +15,7 @@ from numba.core import types
 from qbumpers.decisions import Step
 from qbumpers.simulation.cuda.card import THREADS
 from qbumpers.simulation.cuda.layout import LANES
+from tests.narrowing import present
 
 _MATHS = {"exp": 1, "log": 1, "pow": 2, "fmax": 2, "fmin": 2, "floor": 1}
 _PLACES = ("tid.x", "ctaid.x")  # of a thread, and of its block
@@ -117,15 +119,16 @@ def _begin_of_type(text):
             depth += (text[place] == text[-1]) - (text[place] == _OPENING[text[-1]])
             if not depth:
                 return _begin_of_type(text[:place]) if text[-1] == ")" else place
-    return re.search(r'(%"[^"]*"|[%\w.]+)$', text).start()
+    return present(re.search(r'(%"[^"]*"|[%\w.]+)$', text)).start()
 
 
 def _flat(kinds, values):
     """Arguments as a kernel takes them: arrays and tuples in their parts."""
-    found = []
+    found: list[Any] = []
     for kind, value in zip(kinds, values, strict=True):
         if isinstance(kind, types.BaseTuple):
-            found += _flat(kind.types, value)
+            parts: Any = kind
+            found += _flat(parts.types, value)
         elif isinstance(kind, types.Array):
             sizes = (value.size, value.itemsize)
             found += [ctypes.c_void_p(), ctypes.c_void_p(), *map(ctypes.c_int64, sizes)]

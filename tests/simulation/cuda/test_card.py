@@ -52,9 +52,10 @@ def test_ten_thousand_learners_take_the_same_steps(card):
 @pytest.mark.parametrize("precision", ["float64", "float32"])
 def test_means_agree_within_their_errors(precision, card):
     bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7)
-    given = {"trials": 10_000, "seed": SEED}
-    on_card = simulate("cliff-walking", bumpers, device="gpu", precision=precision, **given)
-    here = simulate("cliff-walking", bumpers, **{**given, "seed": SEED + 1})
+    on_card = simulate(
+        "cliff-walking", bumpers, trials=10_000, seed=SEED, device="gpu", precision=precision
+    )
+    here = simulate("cliff-walking", bumpers, trials=10_000, seed=SEED + 1)
     for name in ("assisted_return", "unassisted_return", "overrides"):
         one, other = (getattr(each.outcomes, name).mean(axis=1) for each in (on_card, here))
         error = np.sqrt((one.var() + other.var()) / len(one))
