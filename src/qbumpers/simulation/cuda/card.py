@@ -100,7 +100,7 @@ def launch(space: Space, arguments: Any, trials: int) -> Any:
         The arguments as they are then, their arrays on the card.
     """
     kernel = _kernel(space, None if SIMULATED else types_on_card(arguments))
-    sent = arguments if SIMULATED else changed(np.ndarray, cuda.to_device, arguments)
+    sent = arguments if SIMULATED else changed((np.ndarray, np.generic), _sent, arguments)
     # A card ends the thread in which something is raised; its simulator raises it, whatever it is.
     unheard = contextlib.suppress(Exception) if SIMULATED else contextlib.nullcontext()
     with warnings.catch_warnings(), unheard:
@@ -116,6 +116,11 @@ def returned(found: Any) -> Any:
         return found
     on_card = cuda.devicearray.DeviceNDArray
     return changed(on_card, lambda array: array.copy_to_host(), found)
+
+
+def _sent(part: Any) -> Any:
+    """An array on the card, or a number as a number of Python."""
+    return cuda.to_device(part) if isinstance(part, np.ndarray) else part.item()
 
 
 @functools.cache
