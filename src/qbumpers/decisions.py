@@ -199,7 +199,8 @@ def begin(values: np.ndarray, episode: int) -> Account:
         values: float64 [A], Q*(s_0, .).
         episode: episodes of this learner or participant before this one.
     """
-    return Account(0.0, 1.0, np.float64(best_value(values)), episode, 0)
+    start_value = float(np.float64(best_value(values)))  # `float` alone keeps float32 if compiled
+    return Account(0.0, 1.0, start_value, episode, 0)
 
 
 @inlined
