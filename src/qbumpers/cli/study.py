@@ -14,7 +14,9 @@ from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError, counted
 from qbumpers.imports import import_modules
 
-study = typer.Typer(help="Look after what was played in the browser.", no_args_is_help=True)
+study = typer.Typer(
+    help="Studies with participants, and what was played in the browser.", no_args_is_help=True
+)
 application.add_typer(study, name="study")
 
 _DEFAULT = ("stochastic-q-bumpers", {"alpha": 0.5})
@@ -66,7 +68,7 @@ def play(
 
     Example: qbumpers play lunar-lander --assistant stochastic-q-bumpers --alpha 0.7
     """
-    _check_installed()
+    check_installed()
     import_modules(imports or (), "--import")
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
@@ -122,7 +124,7 @@ def replay_records(
 
     Example: qbumpers study replay results/play/play.sqlite
     """
-    _check_installed()
+    check_installed()
     import_modules(imports or (), "--import")
     from qbumpers.study.replaying import replay_file
 
@@ -137,7 +139,8 @@ def replay_records(
         raise typer.Exit(1)
 
 
-def _check_installed() -> None:
+def check_installed() -> None:
+    """Check that the extra `study` is installed; RequestError naming what is missing if not."""
     try:
         import itsdangerous as itsdangerous
         import msgspec as msgspec
