@@ -5,16 +5,16 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import AsyncGenerator, Collection
+from collections.abc import AsyncGenerator, Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import sqlalchemy as sql
 from itsdangerous import BadSignature, URLSafeSerializer
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
@@ -71,6 +71,7 @@ class Sessions:
         self._players: dict[str, Player] = {}
         self._finding = asyncio.Lock()
         self.open = 0
+        self.connection = Connection
         self._facts: dict[str, Any] = {
             "task": task_view(setup),
             "offers": offers(setup),
@@ -148,9 +149,39 @@ class Sessions:
         return self._players[session]
 
 
-async def _converse(sessions: Sessions, connection: Connection) -> None:
+class Entrance(Protocol):
+    """Whose pages a server serves: those of play, or of a study.
+
+    Attributes:
+        open: how many pages there are.
+    """
+
+    open: int
+
+    def connection(self, socket: WebSocket) -> Any:
+        """A page at the other end of a socket."""
+        ...
+
+    async def join(self, connection: Any, hello: Any) -> Any:
+        """Whose page it is that has greeted; something that handles messages."""
+        ...
+
+    async def welcome(self, player: Any, connection: Any, hello: Any) -> None:
+        """Show a page where they are."""
+        ...
+
+    async def leave(self, player: Any, connection: Any) -> None:
+        """A page has gone."""
+        ...
+
+    def close(self) -> None:
+        """Write what is waiting."""
+        ...
+
+
+async def _converse(sessions: Entrance, connection: Connection) -> None:
     """Everything that a page says, until it goes."""
-    player: Player | None = None
+    player: Any = None
     try:
         async with asyncio.timeout(_GREETING):
             hello = await connection.receive()
@@ -183,20 +214,27 @@ async def _converse(sessions: Sessions, connection: Connection) -> None:
             await sessions.leave(player, connection)
 
 
-def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
+def make_application(
+    sessions: Entrance,
+    hosts: Collection[str],
+    file: str = "index.html",
+    routes: Sequence[BaseRoute] = (),
+) -> Any:
     """The server as an ASGI application.
 
     Args:
         sessions: that are played on it; closed when it ends.
         hosts: names with ports by which pages may address it.
+        file: name of its page in `STATIC`.
+        routes: further ones.
     """
 
     async def page(_: Request) -> FileResponse:
-        return FileResponse(STATIC / "index.html")
+        return FileResponse(STATIC / file)
 
     async def socket(websocket: WebSocket) -> None:
         await websocket.accept()
-        connection = Connection(websocket)
+        connection = sessions.connection(websocket)
         if sessions.open >= MOST_CONNECTIONS:
             await connection.close(TOO_MUCH, "too many pages are open")
             return
@@ -211,9 +249,9 @@ def make_application(sessions: Sessions, hosts: Collection[str]) -> Any:
         yield
         await asyncio.to_thread(sessions.close)
 
-    routes = [
+    everywhere = [
         Route("/", page),
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), hosts)
+    return Guard(Starlette(routes=[*everywhere, *routes], lifespan=lifespan), hosts)

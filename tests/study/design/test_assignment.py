@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qbumpers.study.design.assignment import Seat, Yoke, assign, yoked_moments
+from qbumpers.study.design.assignment import Seat, Yoke, assign, yoked_dose
 from qbumpers.study.design.conditions import Factor, crossed
 
 HOUR = 3600.0
@@ -171,33 +171,28 @@ def test_the_yoked_condition_waits_for_a_partner_then_catches_up():
 
 
 yokes = st.lists(
-    st.integers(1, 12).flatmap(
-        lambda n: st.tuples(st.just(n), st.sets(st.integers(0, n - 1), max_size=n))
-    ),
+    st.integers(1, 12).flatmap(lambda n: st.tuples(st.just(n), st.integers(0, n))),
     min_size=1,
     max_size=6,
-).map(
-    lambda episodes: Yoke(
-        tuple(n for n, _ in episodes), tuple(tuple(sorted(each)) for _, each in episodes)
-    )
-)
+).map(lambda episodes: Yoke(tuple(n for n, _ in episodes), tuple(m for _, m in episodes)))
 
 
-@given(yokes, st.integers(0, 2**40))
-def test_a_yoked_participant_has_as_many_overrides_at_other_moments(yoke, seed):
+@given(yokes, st.data())
+def test_a_yoked_participant_is_owed_what_the_partner_had_and_no_more(yoke, data):
     delivered = 0
-    for episode, (length, theirs) in enumerate(zip(yoke.lengths, yoke.moments, strict=True)):
-        moments = yoked_moments(yoke, episode, delivered, seed)
-        assert moments == yoked_moments(yoke, episode, delivered, seed)
-        assert len(moments) == len(theirs)  # episodes as long as the partner's miss none
-        assert sorted(set(moments)) == list(moments)
-        assert all(0 <= moment < length for moment in moments)
-        assert len(set(moments) & set(theirs)) == max(0, 2 * len(theirs) - length)
-        delivered += len(moments)
+    for episode in range(len(yoke.lengths)):
+        dose = yoked_dose(yoke, episode, delivered)
+        assert dose.overrides == sum(yoke.overrides[: episode + 1]) - delivered
+        assert 0 <= dose.probability <= 1
+        assert (dose.probability > 0) == (dose.overrides > 0)
+        delivered += data.draw(st.integers(0, dose.overrides))
+    assert delivered <= sum(yoke.overrides)
 
 
-def test_what_a_short_episode_missed_is_made_up_for():
-    yoke = Yoke((5, 5), ((0, 1), (2,)))
-    assert len(yoked_moments(yoke, 1, 0, 3)) == 3
-    assert yoked_moments(yoke, 1, 3, 3) == ()
-    assert len(yoked_moments(yoke, 4, 0, 3)) == 3
+def test_what_an_episode_missed_is_made_up_for_in_the_next():
+    yoke = Yoke((5, 10), (2, 1))
+    assert yoked_dose(yoke, 0, 0) == (2, 0.8)
+    assert yoked_dose(yoke, 1, 2) == (1, 0.2)
+    assert yoked_dose(yoke, 1, 0) == (3, 0.6)
+    assert yoked_dose(yoke, 1, 3) == (0, 0.0)
+    assert yoked_dose(yoke, 4, 0) == (3, 0.6)  # longer than the partner's

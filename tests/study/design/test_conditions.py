@@ -21,7 +21,10 @@ def test_levels_are_crossed():
     assert [condition.name for condition in conditions] == [
         "some/no", "some/why", "yoked/no", "yoked/why",
     ]  # fmt: skip
-    assert conditions[0].options == {"alpha": 0.2}
+    assert (conditions[0].assistant, conditions[0].options["alpha"]) == (
+        "stochastic-q-bumpers",
+        0.2,
+    )
     assert conditions[3].yoked_to == "some/why"
     assert conditions[3].overrides == "explained"
     assert conditions[3].caps == (("help", "yoked", 4),)

@@ -4,8 +4,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-import numpy as np
-
 from qbumpers.study.design.conditions import Condition
 
 Progress = Literal["complete", "ongoing", "ended"]
@@ -127,35 +125,42 @@ class Yoke(NamedTuple):
 
     Attributes:
         lengths: steps of each assisted episode of the training.
-        moments: steps of each of them that were overridden.
+        overrides: how many of them were overridden.
     """
 
     lengths: tuple[int, ...]
-    moments: tuple[tuple[int, ...], ...]
+    overrides: tuple[int, ...]
 
 
-def yoked_moments(yoke: Yoke, episode: int, delivered: int, seed: int) -> tuple[int, ...]:
-    """Steps of an assisted episode that are overridden whatever is proposed.
+class Dose(NamedTuple):
+    """How much a yoked participant is helped in an episode.
 
-    As many as the partner had up to this episode, less those that were delivered before: what did
-    not fit into a short episode is made up for in the next one. Moments are drawn among those of
-    the partner's episode in which the partner was not overridden, as far as there are enough.
+    Attributes:
+        overrides: how many there are at most.
+        probability: with which a worse proposal is overridden until then.
+    """
+
+    overrides: int
+    probability: float
+
+
+def yoked_dose(yoke: Yoke, episode: int, delivered: int) -> Dose:
+    """How much help an assisted episode has: as much as the partner's, at other moments.
+
+    Overrides are owed as they were made to the partner, up to and with this episode; those that
+    could not be delivered, since too few proposals were worse, are owed in the next one. With the
+    probability, twice the share of the partner's steps that were overridden, they come at random
+    moments, whatever the state; and most often all of them come.
 
     Args:
         yoke: of the partner.
         episode: number of the assisted episode, from 0; the partner's last one serves if they had
             fewer.
         delivered: overrides in the assisted episodes before.
-        seed: of the session.
 
     Returns:
-        Numbers of steps, from 0, in increasing order.
+        The dose; of 0 overrides if none is owed.
     """
     theirs = min(episode, len(yoke.lengths) - 1)
-    owed = sum(len(moments) for moments in yoke.moments[: theirs + 1]) - delivered
-    length, taken = yoke.lengths[theirs], set(yoke.moments[theirs])
-    wanted = max(0, min(owed, length))
-    generator = np.random.default_rng([seed, episode, *b"Yoked"])
-    others = generator.permutation([step for step in range(length) if step not in taken]).tolist()
-    same = generator.permutation(sorted(taken)).tolist()
-    return tuple(sorted(int(step) for step in [*others, *same][:wanted]))
+    owed = max(0, sum(yoke.overrides[: theirs + 1]) - delivered)
+    return Dose(owed, min(1.0, 2 * owed / yoke.lengths[theirs]))

@@ -122,7 +122,7 @@ def _check_names(factor: Factor) -> None:
 def _condition(factors: Sequence[Factor], levels: Sequence[Level]) -> Condition:
     name = "/".join(level.name for level in levels)
     yoked = [level.yoked_to for level in levels if level.yoked_to is not None]
-    helping = [level.assistant for level in levels if level.assistant is not None]
+    helping = [a for level in levels if level.assistant for a in level.assistant.assistants()]
     showing: list[Visibility] = [level.overrides for level in levels if level.overrides is not None]
     if len(yoked) + len(helping) != 1:
         raise RequestError(
@@ -131,13 +131,12 @@ def _condition(factors: Sequence[Factor], levels: Sequence[Level]) -> Condition:
         )
     if len(showing) > 1:
         raise RequestError(f"condition {name}: two of its levels say whether overrides are shown")
-    design = helping[0].assistants()[0] if helping else None
     partner = "/".join(level.yoked_to or level.name for level in levels) if yoked else ""
     return Condition(
         name=name,
         levels={factor.name: level.name for factor, level in zip(factors, levels, strict=True)},
-        assistant=design.name if design else "none",
-        options=dict(helping[0].model_extra or {}) if helping else {},
+        assistant=helping[0].name if helping else "none",
+        options=helping[0].described() if helping else {},
         overrides=showing[0] if showing else "shown",
         yoked_to=partner,
         caps=tuple(

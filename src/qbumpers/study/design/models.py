@@ -168,6 +168,7 @@ class Study(Model):
         task: what is played, as a table or just its name.
         values: Q* of the assistants, the path of a file; solved, or the shipped expert's, if left
             out.
+        step_limit: steps after which an episode ends at the latest; the task's own if left out.
         recruitment: how participants come.
         returning: what becomes of who comes back.
         stale_after_minutes: who has not been heard of for so long no longer counts as taking part.
@@ -190,6 +191,7 @@ class Study(Model):
     seed: Annotated[int, Field(ge=0)] = 0
     task: Named
     values: str | None = None
+    step_limit: Annotated[int, Field(ge=1)] | None = None
     recruitment: Recruitment = Recruitment()
     returning: Returning = Returning()
     stale_after_minutes: Annotated[float, Field(gt=0)] = 60

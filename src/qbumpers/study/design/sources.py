@@ -100,8 +100,8 @@ def setups_of(study: Study) -> dict[str, Setup]:
         if key not in made:
             try:
                 made[key] = Setup(
-                    task.name, values, discount=task.discount, episode_limit=task.episode_limit,
-                    **task.arguments,
+                    task.name, values, study.step_limit, discount=task.discount,
+                    episode_limit=task.episode_limit, **task.arguments,
                 )  # fmt: skip
             except RequestError as error:
                 raise RequestError(f"block {part.id}: {error}") from error
