@@ -67,3 +67,149 @@ def _described(design: "Study") -> list[str]:
         f"{counted(len(conditions), 'condition')}: {', '.join(conditions)}",
         f"{counted(len(design.orders()), 'order')} of parts",
     ]
+
+
+Folder = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", help="Folder of the records.", show_default="results/NAME", metavar="DIR"
+    ),
+]
+Live = Annotated[
+    bool, typer.Option("--live", help="The live records, of the study as it was frozen.")
+]
+
+
+def _folder(out: Path | None, design: "Study") -> Path:
+    return out or Path("results") / design.name
+
+
+@study.command("serve")
+def serve_study(
+    file: File,
+    live: Live = False,
+    out: Folder = None,
+    port: Annotated[int, typer.Option(help="Of this machine; 0 for any.", metavar="N")] = 8765,
+    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+) -> None:
+    """Serve a study: a pilot, or live as it was frozen. Ctrl-C ends it.
+
+    Example: qbumpers study serve my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.running import opened, records_of, serve
+    from qbumpers.study.flow.server import StudyHost
+
+    design = load_study(file)
+    setups = check_playable(design)
+    mode, folder = "live" if live else "pilot", _folder(out, design)
+    host = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
+
+    def announce(url: str, researcher: str) -> None:
+        _say(f"The study is at {url}; the records go into {records_of(folder, mode)}")
+        _say(f"The researcher's page is at {researcher}; its token is {host.token}")
+        _say("Ctrl-C ends it.")
+
+    try:
+        serve(host, port=port, browser=browser, announce=announce)
+    except KeyboardInterrupt:
+        OUTPUT.print("\nStopped; what happened is kept.")
+
+
+@study.command("simulate")
+def simulate_study(
+    file: File,
+    participants: Annotated[int, typer.Option(help="How many.", metavar="N", min=1)] = 30,
+    browser: Annotated[
+        bool, typer.Option("--browser", help="Through Chromium instead of the bare WebSocket.")
+    ] = False,
+    out: Folder = None,
+) -> None:
+    """Let simulated learners take part in a study, with drop-outs, reloads and slow ones.
+
+    Example: qbumpers study simulate my-study.toml --participants 90
+    """
+    check_installed()
+    from qbumpers.study.bots.browser import by_browser
+    from qbumpers.study.bots.rehearsing import by_socket, rehearse, without_waiting
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.running import opened, records_of
+
+    design = load_study(file)
+    setups = check_playable(design)
+    folder = _folder(out, design)
+    engine = opened(file, design, setups, folder, "simulated")
+    with OUTPUT.status(f"0 of {participants} participants") as status:
+        done = 0
+
+        def advance(_: object) -> None:
+            nonlocal done
+            done += 1
+            status.update(f"{done} of {participants} participants")
+
+        found = rehearse(
+            without_waiting(design), setups, engine, participants,
+            take_part=by_browser if browser else by_socket, at_once=1 if browser else 8,
+            advance=advance,
+        )  # fmt: skip
+    for outcome, count in sorted(found.outcomes.items()):
+        _say(f"{outcome}: {counted(count, 'participant')}")
+    _say(
+        f"{counted(found.reloads, 'reload')}; the records are in {records_of(folder, 'simulated')}"
+    )
+
+
+@study.command("freeze")
+def freeze_study(file: File) -> None:
+    """Freeze a study for a preregistration: one JSON, a readable page, and a hash.
+
+    Example: qbumpers study freeze my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.freezing import freeze, frozen_path
+    from qbumpers.study.design.sources import check_playable, load_study
+
+    design = load_study(file)
+    digest = freeze(file, design, check_playable(design))
+    _say(f"{frozen_path(file)} and its page are written; SHA-256 {digest}")
+
+
+@study.command("backup")
+def back_up_study(
+    file: File,
+    copy: Annotated[Path, typer.Argument(help="Path of the copy.", metavar="COPY")],
+    live: Live = False,
+    out: Folder = None,
+) -> None:
+    """Copy the records of a study, which may be running.
+
+    Example: qbumpers study backup my-study.toml monday.sqlite --live
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import back_up, records_of
+
+    folder = _folder(out, load_study(file))
+    back_up(records_of(folder, "live" if live else "pilot"), copy)
+    _say(f"{copy} is written")
+
+
+@study.command("restore")
+def restore_study(
+    file: File,
+    copy: Annotated[Path, typer.Argument(help="A backup.", metavar="COPY")],
+    live: Live = False,
+    out: Folder = None,
+) -> None:
+    """Put a backup into the place of records that are lost.
+
+    Example: qbumpers study restore my-study.toml monday.sqlite --live
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import records_of, restore
+
+    records = records_of(_folder(out, load_study(file)), "live" if live else "pilot")
+    restore(copy, records)
+    _say(f"{records} is as {copy}")

@@ -162,15 +162,15 @@ class Entrance(Protocol):
         """A page at the other end of a socket."""
         ...
 
-    async def join(self, connection: Any, hello: Any) -> Any:
+    async def join(self, connection: Any, hello: Any, /) -> Any:
         """Whose page it is that has greeted; something that handles messages."""
         ...
 
-    async def welcome(self, player: Any, connection: Any, hello: Any) -> None:
+    async def welcome(self, player: Any, connection: Any, hello: Any, /) -> None:
         """Show a page where they are."""
         ...
 
-    async def leave(self, player: Any, connection: Any) -> None:
+    async def leave(self, player: Any, connection: Any, /) -> None:
         """A page has gone."""
         ...
 

@@ -5,7 +5,6 @@ import contextlib
 import threading
 from collections import Counter
 from collections.abc import Callable, Generator, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import uvicorn
@@ -95,7 +94,8 @@ def arrival_of(study: Study, number: int) -> dict[str, str]:
     return {"code": recruitment.class_list[number]}
 
 
-def _by_socket(address: str, person: Person, arrival: Mapping[str, str]) -> Any:
+def by_socket(address: str, person: Person, arrival: Mapping[str, str]) -> Any:
+    """Take part over the WebSocket alone, see `TakePart`."""
     return BotPage(address, person, arrival).take_part()
 
 
@@ -105,7 +105,7 @@ def rehearse(
     engine: Any,
     participants: int,
     *,
-    take_part: TakePart = _by_socket,
+    take_part: TakePart = by_socket,
     at_once: int = AT_ONCE,
     advance: Callable[[Taken], None] = lambda taken: None,
 ) -> Rehearsed:
@@ -154,13 +154,3 @@ def _run(everybody: Any) -> list[Taken]:
         return asyncio.run(everybody)
     except* RequestError as errors:
         raise errors.exceptions[0] from None
-
-
-def records_of(folder: str | Path, mode: str) -> Path:
-    """The records file of a study in its folder.
-
-    Args:
-        folder: of the study.
-        mode: "pilot", "live" or "simulated".
-    """
-    return Path(folder) / f"{mode}.sqlite"

@@ -138,8 +138,8 @@ class BlockPlay:
             return ""
         actions: Sequence[str] = self._game.setup.display.actions
         words = {
-            "proposed": actions[last["proposed"]],
-            "executed": actions[last["executed"]],
+            "proposed": actions[int(last["proposed"])],
+            "executed": actions[int(last["executed"])],
             "projected": f"{last['projected']:.0f}",
         }
         key = "override"
@@ -163,6 +163,6 @@ class BlockPlay:
 
     def _question(self, fields: Mapping[str, Any]) -> dict[str, Any]:
         actions: Sequence[str] = self._game.setup.display.actions
-        executed = actions[fields["last"]["executed"]]
+        executed = actions[int(fields["last"]["executed"])]
         text = self._study.word("attribution").format(executed=executed)
         return {"number": fields["number"] - 1, "text": text}

@@ -77,6 +77,7 @@ class StudyHost:
         connection: a page of it at the other end of a socket.
         open: how many pages there are.
         visits: participants who are there, by identifier.
+        token: that opens the researcher's page.
     """
 
     def __init__(
@@ -97,6 +98,7 @@ class StudyHost:
         allowed = 1e6 if exposed else MESSAGES_PER_SECOND
         self.connection = functools.partial(StudyConnection, per_second=allowed)
         self.visits: dict[str, Visit] = {}
+        self.token = secrets.token_urlsafe(16)
         self._setups, self._mode = setups, mode
         self._signer = URLSafeSerializer(secret_of(engine), salt="participant")
         self._finding, self._assigning = asyncio.Lock(), asyncio.Lock()

@@ -92,7 +92,7 @@ def _arrived(study: Study, before: Standing, event: Event) -> Standing:
 
 def _assigned(study: Study, before: Standing, event: Event) -> Standing:
     content: Mapping[str, Any] = event.content
-    theirs: Any = content["lengths"], content["overrides"]
+    theirs: list[list[int]] = [content["lengths"], content["overrides"]]
     yoke = Yoke(*(tuple(each) for each in theirs)) if content["partner"] else None
     return before._replace(
         parts=tuple(study.orders()[content["order"]]),
