@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help demo test test-docs test-slow test-study lint bench docs dist clean
+.PHONY: help demo test test-docs test-slow test-study soak lint bench docs dist clean
 
 help:  ## Show what there is to make
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -19,9 +19,14 @@ test-docs: $(VENV)/installed-dev  ## Run what the pages and examples show, and c
 test-slow: $(VENV)/installed-dev  ## Run the longer checks
 	$(BIN)/pytest -m slow -n 2 --dist worksteal
 
-test-study: $(VENV)/installed-dev  ## Play in a real browser: keys, touch, reloads, a killed server
+test-study: $(VENV)/installed-dev  ## Play in a real browser, and record in PostgreSQL
 	.ci/install_browser
+	.ci/install_postgresql
 	$(BIN)/pytest -m study tests/study
+
+soak: $(VENV)/installed-dev  ## Play for 30 minutes while connections, servers and the database fail
+	.ci/install_postgresql
+	$(BIN)/python -m tests.study.soak --minutes 30
 
 lint: $(VENV)/installed-dev $(VENV)/installed-docs  ## Check style, types and which way imports point
 	$(BIN)/ruff check .

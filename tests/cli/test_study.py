@@ -16,6 +16,8 @@ pytest.importorskip("starlette", reason="the extra study is not installed")
         (["cliff-walking", "stray"], "argument 'stray': an option of the assistant begins with --"),
         (["mountain-car"], "v_min = 0 must be below the value of the start state"),
         (["cliff-walking", "--port", "99999"], "port = 99999"),
+        (["cliff-walking", "--records", "a.sqlite"], "records = 'a.sqlite'; postgresql://USER@HO"),
+        (["cliff-walking", "--records", "mysql://me@there/x"], "records of mysql://: a file, or p"),
         (
             ["cliff-walking", "--assistant", "trajectory-bumpers", "--path=a.csv", "--reach=1"],
             "input should be a valid tuple",

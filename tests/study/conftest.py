@@ -29,3 +29,20 @@ def lander():
     from qbumpers.study.setup import Setup
 
     return Setup("lunar-lander")
+
+
+@pytest.fixture(scope="session")
+def postgresql():
+    """A PostgreSQL server that no test stops."""
+    from tests.study.postgresql import database
+
+    with database() as running:
+        yield running
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.study)])
+def store(request, tmp_path):
+    """Where records may be, empty: a file, or a database of its own."""
+    if request.param == "sqlite":
+        return str(tmp_path / "folder" / "play.sqlite")
+    return request.getfixturevalue("postgresql").new()

@@ -47,7 +47,8 @@ _EVENTS = ("assisted_success", "unassisted_success", "assisted_crash", "unassist
 def trial_measures(episodes: pl.DataFrame, criterion: float | None = None) -> pl.DataFrame:
     """A row per trial: its measures (macro averages start here).
 
-    The first and last 10% are rounded down to whole episodes, at least one. Areas are by
+    Trials may have different numbers of episodes, as those of participants do. The first and last
+    10% are rounded down to whole episodes, at least one. Areas are by
     trapezoids. A trial reaches the criterion with the first of five successive unassisted
     episodes that do (of all of them, if a trial has fewer); `criterion_episodes` counts the
     training episodes up to there. A trial that never does counts with all its episodes, so that
@@ -71,12 +72,11 @@ def trial_measures(episodes: pl.DataFrame, criterion: float | None = None) -> pl
 def _training_measures(training: pl.DataFrame) -> pl.DataFrame:
     """Everything that training episodes say, by trial."""
     order = training["condition"].unique(maintain_order=True)
-    length = int(training["episode"].max()) + 1 if training.height else 0  # type: ignore[arg-type]
     found = training.group_by(*_KEY, maintain_order=True).agg(
         pl.col("assistant", "alpha", "learner").first(),
-        *(expression for side in ("assisted", "unassisted") for expression in _of(side, length)),
+        *(expression for side in ("assisted", "unassisted") for expression in _of(side)),
         pl.col("overrides").mean(),
-        *_override_rates(length),
+        *_override_rates(),
         *(pl.col(event).mean() for event in _EVENTS),
     )
     return (
@@ -90,31 +90,32 @@ def _training_measures(training: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _of(side: str, length: int) -> list[pl.Expr]:
+_EPISODE = pl.col("episode")
+_LENGTH = _EPISODE.max() + 1  # of a trial
+_TENTH = (_LENGTH // 10).clip(lower_bound=1)
+_LAST = _EPISODE >= _LENGTH - _TENTH
+
+
+def _of(side: str) -> list[pl.Expr]:
     """Mean, mean over the last tenth and area of the returns of "assisted" or "unassisted"."""
-    returns, episode = pl.col(f"{side}_return"), pl.col("episode")
-    ends = returns.filter(episode == 0).sum() + returns.filter(episode == length - 1).sum()
+    returns = pl.col(f"{side}_return")
+    ends = returns.filter(_EPISODE == 0).sum() + returns.filter(_EPISODE == _LENGTH - 1).sum()
     return [
         returns.mean().alias(side),
-        returns.filter(episode >= length - _tenth(length)).mean().alias(f"{side}_last"),
+        returns.filter(_LAST).mean().alias(f"{side}_last"),
         (returns.sum() - ends / 2).alias(f"{side}_area"),
     ]
 
 
-def _override_rates(length: int) -> Iterator[pl.Expr]:
-    episode = pl.col("episode")
+def _override_rates() -> Iterator[pl.Expr]:
     spans = {
         "override_rate": pl.lit(True),
-        "override_rate_first": episode < _tenth(length),
-        "override_rate_last": episode >= length - _tenth(length),
+        "override_rate_first": _EPISODE < _TENTH,
+        "override_rate_last": _LAST,
     }
     for name, span in spans.items():
         overrides, steps = (pl.col(c).filter(span).sum() for c in ("overrides", "assisted_length"))
         yield (overrides / steps).alias(name)
-
-
-def _tenth(length: int) -> int:
-    return max(1, length // 10)
 
 
 def _retention(retained: pl.DataFrame) -> pl.DataFrame:
@@ -221,8 +222,7 @@ def learning_curve(
     Returns:
         float64 [3, B]: mean, low, high; within [0, 1] if the measure is a share.
     """
-    values = _by_trial(episodes, condition, column)
-    found = _course(_block_sums(values, starts) / _block_sums(np.ones_like(values), starts))
+    found = _course(_block_means(_by_trial(episodes, condition, column), starts))
     return np.clip(found, 0, 1) if column in SHARES else found
 
 
@@ -244,19 +244,32 @@ def override_curve(
         _block_sums(_by_trial(training, condition, column), starts)
         for column in ("overrides", "assisted_length")
     )
-    return np.clip(_course(overrides / steps), 0, 1)
+    with np.errstate(invalid="ignore"):  # of trials without an episode there
+        return np.clip(_course(overrides / steps), 0, 1)
 
 
 def _by_trial(episodes: pl.DataFrame, condition: str, column: str) -> np.ndarray:
-    """A column of a condition, float64 [T, E]."""
-    chosen = episodes.filter(pl.col("condition") == condition).sort("trial", "episode")
-    length = chosen["episode"].n_unique()
-    return chosen[column].cast(pl.Float64).to_numpy().reshape(-1, length)
+    """A column of a condition, float64 [T, E] of the longest trial of all; NaN where one ended."""
+    length = int(episodes["episode"].max()) + 1  # type: ignore[arg-type]
+    chosen = episodes.filter(pl.col("condition") == condition)
+    trials, trial = np.unique(chosen["trial"].to_numpy(), return_inverse=True)
+    values = np.full((len(trials), length), np.nan)
+    values[trial, chosen["episode"].to_numpy()] = chosen[column].cast(pl.Float64).to_numpy()
+    return values
+
+
+def _block_means(values: np.ndarray, starts: np.ndarray | None) -> np.ndarray:
+    """Means over blocks of what is known; NaN if nothing is."""
+    known = ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        return _block_sums(values, starts) / _block_sums(known.astype(float), starts)
 
 
 def _block_sums(values: np.ndarray, starts: np.ndarray | None) -> np.ndarray:
-    return values if starts is None else np.add.reduceat(values, starts, axis=1)
+    known = np.where(np.isnan(values), 0.0, values)
+    return known if starts is None else np.add.reduceat(known, starts, axis=1)
 
 
 def _course(values: np.ndarray) -> np.ndarray:
-    return np.array([mean_interval(column) for column in values.T]).T
+    known = [column[~np.isnan(column)] for column in values.T]
+    return np.array([mean_interval(part) if len(part) else UNKNOWN for part in known]).T

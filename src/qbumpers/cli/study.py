@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -14,13 +14,23 @@ from qbumpers.cli.working import Imports
 from qbumpers.errors import RequestError, counted
 from qbumpers.imports import import_modules
 
+if TYPE_CHECKING:
+    from qbumpers.experiments.participants import Exported
+
 study = typer.Typer(
     help="Studies with participants, and what was played in the browser.", no_args_is_help=True
 )
 application.add_typer(study, name="study")
 
+_RECORDS = "play.sqlite"  # in the folder of --out
 _DEFAULT = ("stochastic-q-bumpers", {"alpha": 0.5})
 
+Records = Annotated[
+    str,
+    typer.Argument(
+        help="What play recorded: a file, or the URL of a PostgreSQL database.", metavar="RECORDS"
+    ),
+]
 Alpha = Annotated[
     float | None,
     typer.Option(help="How much the assistant leaves to you.", metavar="SHARE"),
@@ -60,6 +70,14 @@ def play(
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
     ] = Path("results/play"),
+    records: Annotated[
+        str | None,
+        typer.Option(
+            help="PostgreSQL database for the record, which several servers may share.",
+            show_default="a file in the folder of --out",
+            metavar="URL",
+        ),
+    ] = None,
     imports: Imports = None,
 ) -> None:
     """Play a task in the browser, with an assistant.
@@ -73,6 +91,7 @@ def play(
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
     from qbumpers.study.setup import Setup
+    from qbumpers.study.stores import place_of
 
     options = dict(_options_in(context.args))
     if alpha is not None:
@@ -82,15 +101,27 @@ def play(
     else:
         choice = Choice(assistant or _DEFAULT[0], options)
     setup = Setup(task, values, discount=discount)
+    place = _database_at(records) if records is not None else out / _RECORDS
+
+    def announce(url: str) -> None:
+        OUTPUT.print(f"Play at [bold]{url}[/bold]", soft_wrap=True)
+        where = escape(place_of(place))
+        OUTPUT.print(f"The record goes into {where}; Ctrl-C ends it.", soft_wrap=True)
+
     try:
-        serve(setup, choice, out, port=port, browser=browser, announce=_announce)
+        serve(setup, choice, place, port=port, browser=browser, announce=announce)
     except KeyboardInterrupt:
         OUTPUT.print("\nStopped; what was played is kept.")
 
 
-def _announce(url: str, records: Path) -> None:
-    OUTPUT.print(f"Play at [bold]{url}[/bold]", soft_wrap=True)
-    OUTPUT.print(f"The record goes into {escape(str(records))}; Ctrl-C ends it.", soft_wrap=True)
+def _database_at(records: str) -> str:
+    from qbumpers.study.stores import is_url
+
+    if not is_url(records):
+        raise RequestError(
+            f"records = {records!r}; postgresql://USER@HOST/DATABASE is needed, or --out for a file"
+        )
+    return records
 
 
 def _options_in(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
@@ -117,7 +148,7 @@ def _value_of(text: str) -> Any:
 
 @study.command("replay")
 def replay_records(
-    file: Annotated[Path, typer.Argument(help="What play recorded.", metavar="FILE")],
+    records: Records,
     imports: Imports = None,
 ) -> None:
     """Decide recorded sessions again, and say whether anything comes out differently.
@@ -129,7 +160,7 @@ def replay_records(
     from qbumpers.study.replaying import replay_file
 
     different = 0
-    for found in replay_file(file):
+    for found in replay_file(records):
         sizes = f"{counted(found.episodes, 'episode')}, {counted(found.steps, 'step')}"
         verdict = f"different: {found.difference}" if found.difference else "OK"
         line = f"{found.session} {found.task}: {sizes}: {verdict}"
@@ -137,6 +168,50 @@ def replay_records(
         different += bool(found.difference)
     if different:
         raise typer.Exit(1)
+
+
+@study.command("export")
+def export(
+    records: Records,
+    out: Annotated[Path, typer.Option(help="Folder for the files.", metavar="DIR")],
+    imports: Imports = None,
+) -> None:
+    """Write what was played as an experiment's files, a participant in the place of a trial.
+
+    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them.
+
+    Example: qbumpers study export results/play/play.sqlite --out results/played
+    """
+    check_installed()
+    import_modules(imports or (), "--import")
+    from qbumpers.experiments.participants import STEPS, export_records
+
+    for found in export_records(records, out):
+        OUTPUT.print(
+            f"[bold]{escape(found.task)}[/bold]: {counted(found.participants, 'participant')}, "
+            f"{counted(found.episodes, 'episode')}, into {escape(str(found.folder))}",
+            soft_wrap=True,
+        )
+        for text in _unfinished(found):
+            OUTPUT.print(text, soft_wrap=True)
+        OUTPUT.print(f"  qbumpers fit {escape(str(found.folder / STEPS))}", soft_wrap=True)
+        if found.pairs:
+            OUTPUT.print(f"  qbumpers report {escape(str(found.folder))}", soft_wrap=True)
+
+
+def _unfinished(found: "Exported") -> Iterator[str]:
+    """What is not in the tables of a report, in sentences."""
+    if not found.pairs:
+        yield "No unassisted episode follows an assisted one: there is nothing for a report."
+    elif found.unpaired:
+        yield (
+            f"{counted(found.unpaired, 'episode')} not in the report, which compares each assisted "
+            "episode with the unassisted one after it; played.parquet has all."
+        )
+    if found.unfinished:
+        yield f"{counted(found.unfinished, 'episode')} did not end: steps are there, returns not."
+    if found.idle:
+        yield f"{counted(found.idle, 'session')} without a step."
 
 
 def check_installed() -> None:

@@ -34,6 +34,10 @@ REPRODUCTIONS = ("cliff-walking", "lunar-lander")
 """What `reproduces` may name: published experiments, those of `qbumpers.reproduction`."""
 
 
+PARTICIPANT = "participant"
+"""In the place of a learner's name: a person, who is not simulated."""
+
+
 class TaskDesign(Model):
     """Which task: a registered one by name, or a Gymnasium environment.
 
@@ -166,6 +170,11 @@ class Experiment(Model):
         if self.reproduces is not None and self.reproduces not in REPRODUCTIONS:
             raise unknown_name("reproduces", self.reproduces, REPRODUCTIONS)
         return self
+
+    @property
+    def of_participants(self) -> bool:
+        """Whether people learned, not simulated learners: nothing of it can be run again."""
+        return self.learners[0].name == PARTICIPANT
 
     @property
     def tabular(self) -> bool:

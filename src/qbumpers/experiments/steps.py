@@ -9,10 +9,9 @@ import polars as pl
 
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, in_short
+from qbumpers.experiments.design import PARTICIPANT
 from qbumpers.experiments.recordings import INFOS
 from qbumpers.tasks.dynamics import TERMINATED, TRUNCATED
-
-PARTICIPANT = "participant"
 
 
 def save_steps(path: str | Path, participants: Mapping[str, Step]) -> None:
@@ -32,11 +31,19 @@ def save_steps(path: str | Path, participants: Mapping[str, Step]) -> None:
         raise RequestError("participants = {}; at least one is needed")
     for name, steps in participants.items():
         _check_numbered(steps.state, f"participant {name}")
-    parts = [
+    step_table(participants).write_parquet(path)
+
+
+def step_table(participants: Mapping[str, Step]) -> pl.DataFrame:
+    """A row per step: the participant, and the fields of `qbumpers.Step`.
+
+    Args:
+        participants: a table of steps for each name, at least one; states may be vectors.
+    """
+    return pl.concat(
         pl.DataFrame({PARTICIPANT: [str(name)] * len(steps.episode), **_columns(steps)})
         for name, steps in participants.items()
-    ]
-    pl.concat(parts).write_parquet(path)
+    )
 
 
 def _columns(steps: Step) -> dict[str, np.ndarray]:

@@ -63,7 +63,9 @@ class Results(NamedTuple):
 
     @property
     def missing(self) -> dict[str, int]:
-        """How many trials each condition lacks, by id; nothing of a finished run."""
+        """How many trials each condition lacks, by id; nothing of a finished run, or of people."""
+        if self.experiment.of_participants:
+            return {}
         counts = self.episodes.group_by("condition").agg(pl.col("trial").n_unique())
         there = dict(counts.iter_rows())
         lacking = {
@@ -129,6 +131,8 @@ def _whole_tables(
         check_columns(table, _COLUMNS[name], f"{folder}/{name}")
     episodes = tables[EPISODES]
     ids = set(record_of(record, experiment, episodes).by_id())
+    if experiment.of_participants:  # who play as much as they like
+        return tables
     rows = len(ids) * experiment.trials * (experiment.episodes + experiment.retention)
     whole = episodes.height == rows and set(episodes["condition"].unique()) == ids
     return tables if whole else None

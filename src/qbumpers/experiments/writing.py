@@ -6,7 +6,7 @@ import io
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -181,7 +181,7 @@ def open_store(folder: str | Path, experiment: Experiment, record: Record) -> It
             record = record._replace(identities={**before.identities, **record.identities})
         _clear_left(place, [record, *([before] if before else [])])
         place.write(CONDITIONS, record.encoded())
-        place.write(EXPERIMENT, _described(experiment).encode())
+        place.write(EXPERIMENT, described(experiment).encode())
         yield Store(place, tables_of(experiment), record, before)
 
 
@@ -193,7 +193,13 @@ def _clear_left(folder: Folder, records: Sequence[Record]) -> None:
         folder.clear_left(place, is_cell_file)
 
 
-def _described(experiment: Experiment) -> str:
+def described(experiment: Experiment, **more: Any) -> str:
+    """An experiment as its output folder notes it, with what is noted of the run.
+
+    Args:
+        experiment: as run.
+        **more: what else is noted of the run.
+    """
     settings = experiment.model_dump(exclude_none=True)
     run = {
         "format": FORMAT,
@@ -201,6 +207,7 @@ def _described(experiment: Experiment) -> str:
         "python": platform.python_version(),
         "platform": platform.platform(),
         **{name: importlib.metadata.version(name) for name in _LIBRARIES},
+        **more,
     }
     return tomli_w.dumps({**settings, "run": run})
 

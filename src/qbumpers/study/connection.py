@@ -15,6 +15,9 @@ TAKEN_OVER, TOO_MUCH, WRONG, UNKNOWN_SESSION, NOT_KEPT, FAILED = range(4001, 400
 proper greeting; a session that cannot be gone on with; what happened could not be written; the task
 or the assistant failed."""
 
+AGAIN = 1013
+"""Of WebSockets: the page may come back in a moment."""
+
 MESSAGES_PER_SECOND = 100.0
 """That a page may send for long; keys repeat about 30 times per second."""
 

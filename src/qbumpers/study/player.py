@@ -8,7 +8,14 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from qbumpers.errors import RequestError, action_number
-from qbumpers.study.connection import FAILED, NOT_KEPT, TAKEN_OVER, Connection, GoneError
+from qbumpers.study.connection import (
+    AGAIN,
+    FAILED,
+    NOT_KEPT,
+    TAKEN_OVER,
+    Connection,
+    GoneError,
+)
 from qbumpers.study.game import Choice, Game
 from qbumpers.study.messages import (
     Act,
@@ -21,9 +28,9 @@ from qbumpers.study.messages import (
     Pause,
     Speed,
 )
-from qbumpers.study.tables import EPISODES, NOTES, STEPS, step_row
+from qbumpers.study.tables import EPISODES, NOTES, STEPS, Tenure, step_row
 from qbumpers.study.views import episode_view, state_view
-from qbumpers.study.writing import Row, Writer
+from qbumpers.study.writing import Row, TakenOverError, UnreachableError, Writer
 
 COUNTDOWN = 3
 """Seconds before the clock goes on."""
@@ -56,28 +63,28 @@ class Player:
     """A session with at most one page; every step is committed before its outcome is shown.
 
     Args:
-        session: identifier.
+        tenure: by which its steps are added to the record.
         game: as far as the record goes.
         writer: of the records.
         second: how long a second of the countdown takes.
         with_view: whether the page is sent what the assistant sees.
 
     Attributes:
-        session: identifier.
+        tenure: see above; it has the session's identifier.
         connection: the page; None while it is away.
         lost: whether the game went wrong, so that the record alone knows the state.
     """
 
     def __init__(
         self,
-        session: str,
+        tenure: Tenure,
         game: Game,
         writer: Writer,
         second: float = 1.0,
         *,
         with_view: bool = True,
     ) -> None:
-        self.session = session
+        self.tenure = tenure
         self.connection: Connection | None = None
         self.lost = False
         self._game, self._writer, self._second = game, writer, second
@@ -170,7 +177,7 @@ class Player:
             choice = Choice(message.assistant, message.options, message.assisted)
             await asyncio.to_thread(game.begin, choice)
             row = {
-                "session": self.session,
+                "session": self.tenure.session,
                 "episode": message.episode,
                 "began": time.time(),
                 "assistant": choice.name,
@@ -213,7 +220,7 @@ class Player:
             raise GoneError from error
         over = not game.playing
         row = {
-            **step_row(self.session, game.number - 1, game.episodes[-1].number, step),
+            **step_row(self.tenure.session, game.number - 1, game.episodes[-1].number, step),
             "device": proposal.device,
             "shown": proposal.shown,
             "pressed": proposal.pressed,
@@ -225,7 +232,13 @@ class Player:
 
     async def _commit(self, row: Row, *, lasting: bool = False) -> None:
         try:
-            await asyncio.wrap_future(self._writer.add([row], lasting=lasting))
+            await asyncio.wrap_future(self._writer.add([row], self.tenure, lasting=lasting))
+        except TakenOverError as error:
+            await self._give_up(TAKEN_OVER, str(error))
+            raise GoneError from error
+        except UnreachableError as error:
+            await self._give_up(AGAIN, f"the database cannot be reached just now: {error}")
+            raise GoneError from error
         except Exception as error:
             reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
             await self._give_up(NOT_KEPT, f"the record cannot be written: {reason}")
@@ -239,7 +252,7 @@ class Player:
             await self.connection.close(code, reason)
 
     async def _note(self, kind: str, content: Mapping[str, Any]) -> None:
-        row = {"session": self.session, "time": time.time(), "kind": kind}
+        row = {"session": self.tenure.session, "time": time.time(), "kind": kind}
         await self._commit((NOTES, {**row, "content": _json(content)}))
 
     async def _show(self) -> None:

@@ -33,18 +33,16 @@ class Replayed(NamedTuple):
     difference: str
 
 
-def replay_file(path: str | Path) -> list[Replayed]:
-    """Hold rule and task to every session of a records file.
+def replay_file(records: str | Path) -> list[Replayed]:
+    """Hold rule and task to every session of records.
 
     Args:
-        path: of the file.
+        records: as `open_records` takes them.
 
     Raises:
-        RequestError: if it is no records file.
+        RequestError: as `open_records`.
     """
-    if not Path(path).is_file():
-        raise RequestError(f"records file {path}: there is none")
-    engine = open_records(path)
+    engine = open_records(records, new=False)
     found = (read_session(engine, session) for session in sessions_in(engine))
     results = [replay_session(recorded) for recorded in found if recorded is not None]
     engine.dispose()

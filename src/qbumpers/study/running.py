@@ -16,41 +16,37 @@ from qbumpers.study.server import Sessions, make_application
 from qbumpers.study.setup import Setup
 from qbumpers.study.tables import open_records
 
-RECORDS = "play.sqlite"
-"""Name of the records file in its folder."""
-
 
 def play(
     setup: Setup,
     choice: Choice,
-    folder: Path,
+    records: str | Path,
     *,
     port: int,
     browser: bool,
-    announce: Callable[[str, Path], None],
+    announce: Callable[[str], None],
 ) -> None:
     """Serve a task on this machine until Ctrl-C.
 
     Args:
         setup: what is played.
         choice: who assists unless the participant chooses.
-        folder: of the records.
+        records: where they are, as `open_records` takes them.
         port: of 127.0.0.1; any that is free if 0.
         browser: whether to open the page in a browser.
-        announce: is called with the page's URL and the records file before anyone is served.
+        announce: is called with the page's URL before anyone is served.
 
     Raises:
         RequestError: if the assistant does not suit the task, the port is in use, or the records
             cannot be written.
     """
     Game(setup, 0).begin(choice)
-    path = folder / RECORDS
     with contextlib.closing(listening_at(port)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
         url = f"http://{address}/"
-        sessions = Sessions(setup, choice, open_records(path))
+        sessions = Sessions(setup, choice, open_records(records))
         hosts = [address, address.replace("127.0.0.1", "localhost")]
-        announce(url, path)
+        announce(url)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
         uvicorn.Server(configuration(make_application(sessions, hosts))).run([listening])

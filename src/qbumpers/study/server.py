@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 import sqlalchemy as sql
 from itsdangerous import BadSignature, URLSafeSerializer
+from sqlalchemy.exc import OperationalError
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse
@@ -21,6 +22,7 @@ from starlette.websockets import WebSocket
 import qbumpers
 from qbumpers.errors import RequestError
 from qbumpers.study.connection import (
+    AGAIN,
     TOO_MUCH,
     UNKNOWN_SESSION,
     WRONG,
@@ -34,9 +36,17 @@ from qbumpers.study.messages import Hello
 from qbumpers.study.offers import offers
 from qbumpers.study.player import Player
 from qbumpers.study.setup import Setup
-from qbumpers.study.tables import SESSIONS, read_session, secret_of
+from qbumpers.study.tables import (
+    SESSIONS,
+    TENURES,
+    Tenure,
+    drives,
+    read_session,
+    secret_of,
+    take_session,
+)
 from qbumpers.study.views import task_view
-from qbumpers.study.writing import Writer
+from qbumpers.study.writing import UnreachableError, Writer
 
 STATIC = Path(__file__).with_name("static")
 """The folder of the page."""
@@ -95,14 +105,16 @@ class Sessions:
 
     async def welcome(self, player: Player, connection: Connection, hello: Hello) -> None:
         """Show a page where its session is."""
-        token = self._signer.dumps(player.session)
+        token = self._signer.dumps(player.tenure.session)
         await player.welcome(connection, hello, {**self._facts, "token": token})
 
     async def leave(self, player: Player, connection: Connection) -> None:
         """A page has gone; a session without one is forgotten, since the record has it all."""
+        session, gone = player.tenure.session, False
         with contextlib.suppress(GoneError):
-            if await player.leave(connection) and self._players.get(player.session) is player:
-                del self._players[player.session]
+            gone = await player.leave(connection)
+        if (gone or player.lost) and self._players.get(session) is player:
+            del self._players[session]
 
     def close(self) -> None:
         """Write what is waiting."""
@@ -116,9 +128,15 @@ class Sessions:
         except BadSignature:
             raise UnknownSessionError("this server knows no such session") from None
         playing = self._players.get(session)
-        if playing is not None and not playing.lost:
+        if playing is not None and await self._goes_on(playing):
             return playing
-        return self._add(session, await asyncio.to_thread(self._recorded, session))
+        return self._add(*await asyncio.to_thread(self._taken, session))
+
+    async def _goes_on(self, player: Player) -> bool:
+        """Whether a session is as its record says: not if another server took it."""
+        if player.lost:
+            return False
+        return await asyncio.to_thread(drives, self._engine, player.tenure)
 
     async def _new(self) -> Player:
         session, seed = secrets.token_urlsafe(16), secrets.randbits(63)
@@ -129,24 +147,29 @@ class Sessions:
             "setup": self._setup.described(),
             "version": qbumpers.__version__,
         }
-        await asyncio.wrap_future(self._writer.add([(SESSIONS, row)]))
-        return self._add(session, Game(self._setup, seed))
+        tenure = Tenure(session, 0)
+        rows = [(SESSIONS, row), (TENURES, tenure.row())]
+        await asyncio.wrap_future(self._writer.add(rows))
+        return self._add(tenure, Game(self._setup, seed))
 
-    def _recorded(self, session: str) -> Game:
+    def _taken(self, session: str) -> tuple[Tenure, Game]:
+        """A session of the record, taken from whoever drove it."""
+        tenure = take_session(self._engine, session)
         recorded = read_session(self._engine, session)
-        if recorded is None:
+        if tenure is None or recorded is None:
             raise UnknownSessionError("this server knows no such session")
         difference = self._setup.difference(recorded.setup)
         if difference:
             raise UnknownSessionError(f"the session before cannot go on: {difference}")
         try:
-            return resumed(self._setup, recorded.seed, recorded.played)
+            return tenure, resumed(self._setup, recorded.seed, recorded.played)
         except RequestError as error:
             raise UnknownSessionError(f"the session before cannot go on: {error}") from error
 
-    def _add(self, session: str, game: Game) -> Player:
-        self._players[session] = Player(session, game, self._writer, self._second)
-        return self._players[session]
+    def _add(self, tenure: Tenure, game: Game) -> Player:
+        player = Player(tenure, game, self._writer, self._second)
+        self._players[tenure.session] = player
+        return player
 
 
 class Entrance(Protocol):
@@ -206,6 +229,8 @@ async def _converse(sessions: Entrance, connection: Connection) -> None:
         await connection.close(TOO_MUCH, str(error))
     except RequestError as error:
         await connection.close(WRONG, str(error))
+    except (UnreachableError, OperationalError):
+        await connection.close(AGAIN, "the records cannot be reached just now")
     except Exception:
         _LOGGER.exception("a session failed")
         await connection.close(1011, "the server failed; what happened before is kept")

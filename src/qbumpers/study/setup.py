@@ -36,6 +36,7 @@ class Setup:
         display: how it is shown.
         limit: steps after which an episode ends.
         model: what a rule may know of it.
+        values: gives Q* with further rows, by a tuple of their names; made when they are asked for.
         description: what it was made of, JSON-like, and the digests that its records hang on.
 
     Raises:
@@ -55,14 +56,14 @@ class Setup:
         self.limit = min(step_limit or self.task.episode_limit, self.task.episode_limit)
         self.model = _model_of(self.task)
         self._source = None if values is None else str(values)
-        self._values = functools.cache(self._values_with)
+        self.values = functools.cache(self._values_with)
         self.description: dict[str, Any] = {
             "task": name,
             "arguments": given,
             "values": self._source,
             "digest": self.task.digest(),
             "revision": self.task.revision,
-            "values digest": self._values(()).digest(),
+            "values digest": self.values(()).digest(),
         }
         if step_limit is not None:
             self.description["step limit"] = step_limit
@@ -74,7 +75,7 @@ class Setup:
             RequestError: if the assistant does not suit the task, or there are no such values.
         """
         assistant.check_task(self.task.name, self.has)
-        values: Any = self._values(tuple(assistant.values))
+        values: Any = self.values(tuple(assistant.values))
         return Session(
             assistant, values if self.task.seen is None else OffsetValues(values, 0), self.model
         )

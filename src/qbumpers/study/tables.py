@@ -1,22 +1,20 @@
-"""The tables of a records file, and reading them. Rows are added, never changed."""
+"""The tables of records, and reading them. Rows are added, never changed."""
 
 import json
-import secrets
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import sqlalchemy as sql
-from sqlalchemy import event
 from sqlalchemy.exc import DatabaseError
 
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError
 from qbumpers.study.game import Choice, Played
-
-SCHEMA = 1
-"""Version of the tables, raised when they change."""
+from qbumpers.study.stores import engine_of, lock, reading, shown
+from qbumpers.study.upgrades import bring_up_to_date
 
 _metadata = sql.MetaData()
 
@@ -39,6 +37,15 @@ SESSIONS = sql.Table(
 )
 """One row per participant: when they came (seconds since 1970), the seed, the setup as JSON, and
 the version of the package."""
+
+TENURES = sql.Table(
+    "tenures",
+    _metadata,
+    sql.Column("session", sql.String, primary_key=True),
+    sql.Column("tenure", sql.Integer, primary_key=True),
+    sql.Column("began", sql.Float, nullable=False),
+)
+"""One row per time that a server took a session: only the last one may add to the session."""
 
 EPISODES = sql.Table(
     "episodes",
@@ -91,58 +98,92 @@ NOTES = sql.Table(
 """What else happened: pages that joined (with refresh rate and size) and left, focus, pauses."""
 
 
-def open_records(path: str | Path) -> sql.Engine:
-    """A records file, made with its tables if there is none.
+def open_records(records: str | Path, *, new: bool = True) -> sql.Engine:
+    """Records, with their tables, which are brought up to date if they are older.
 
     Args:
-        path: of the file; folders above it are made.
+        records: path of a SQLite file, or URL of a PostgreSQL database.
+        new: whether a file, and the folders above it, are made if there are none.
 
     Returns:
-        An engine whose transactions begin at once as writers, with a write-ahead log.
+        An engine whose transactions begin as writers; `reading` gives one that only reads.
 
     Raises:
-        RequestError: if it is no records file, or of another version of the tables.
+        RequestError: if there are no such records, or they are something else, cannot be reached or
+            are of a newer version.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.touch(mode=0o600)  # it holds what tokens are signed with
-    engine = sql.create_engine(f"sqlite:///{path}")
-    event.listen(engine, "connect", _prepare)
-    event.listen(engine, "begin", _begin)
+    engine = engine_of(records, new=new)
     try:
-        with engine.begin() as connection:
-            _metadata.create_all(connection)
-            _check_version(connection, path)
+        bring_up_to_date(engine, _metadata, shown(records))
     except DatabaseError as error:
-        raise RequestError(f"records file {path}: {error.orig}") from error
+        engine.dispose()
+        reason = str(error.orig).strip().partition("\n")[0]
+        raise RequestError(f"{shown(records)}: {reason}") from error
+    except RequestError:
+        engine.dispose()
+        raise
     return engine
 
 
-def _prepare(connection: Any, _: Any) -> None:
-    connection.isolation_level = None  # SQLAlchemy begins transactions, not Python's module
-    for setting in ("journal_mode = WAL", "synchronous = NORMAL", "busy_timeout = 5000"):
-        connection.execute(f"PRAGMA {setting}")
-
-
-def _begin(connection: sql.Connection) -> None:
-    connection.exec_driver_sql("BEGIN IMMEDIATE")
-
-
-def _check_version(connection: sql.Connection, path: Path) -> None:
-    found = connection.execute(sql.select(ABOUT.c.schema)).scalar()
-    if found is None:
-        connection.execute(ABOUT.insert(), {"schema": SCHEMA, "secret": secrets.token_hex(32)})
-    elif found != SCHEMA:
-        raise RequestError(
-            f"records file {path}: its tables are of version {found}, these of {SCHEMA}; use the "
-            "version of qbumpers that wrote it"
-        )
-
-
 def secret_of(engine: sql.Engine) -> str:
-    """What session tokens of a records file are signed with."""
-    with engine.connect() as connection:
+    """What session tokens of records are signed with."""
+    with reading(engine) as connection:
         return connection.execute(sql.select(ABOUT.c.secret)).scalar_one()
+
+
+class Tenure(NamedTuple):
+    """A server's right to add to a session, until another one takes it.
+
+    Attributes:
+        session: identifier.
+        number: counted from 0.
+    """
+
+    session: str
+    number: int
+
+    def row(self) -> dict[str, Any]:
+        """The columns of its row, as of now."""
+        return {"session": self.session, "tenure": self.number, "began": time.time()}
+
+
+def take_session(engine: sql.Engine, session: str) -> Tenure | None:
+    """Take a session from whichever server drives it; what that one added before is committed.
+
+    Args:
+        engine: of the records.
+        session: identifier.
+
+    Returns:
+        The right to add to it; None if there is no such session.
+    """
+    with engine.begin() as connection:
+        lock(connection, session)
+        last = latest_tenures(connection, [session]).get(session)
+        if last is None:
+            return None
+        tenure = Tenure(session, last + 1)
+        connection.execute(TENURES.insert(), tenure.row())
+    return tenure
+
+
+def drives(engine: sql.Engine, tenure: Tenure) -> bool:
+    """Whether nobody has taken a session since."""
+    with reading(engine) as connection:
+        return latest_tenures(connection, [tenure.session])[tenure.session] == tenure.number
+
+
+def latest_tenures(connection: sql.Connection, sessions: Sequence[str]) -> dict[str, int]:
+    """The number of each session's last tenure; sessions that are not there are left out."""
+    found = connection.execute(_LATEST, {"sessions": sessions})
+    return {row.session: row.tenure for row in found}
+
+
+_LATEST = (
+    sql.select(TENURES.c.session, sql.func.max(TENURES.c.tenure).label("tenure"))
+    .where(TENURES.c.session.in_(sql.bindparam("sessions", expanding=True)))
+    .group_by(TENURES.c.session)
+)
 
 
 def step_row(session: str, number: int, episode: int, step: Step) -> dict[str, Any]:
@@ -205,10 +246,15 @@ class Recorded(NamedTuple):
     setup: dict[str, Any]
     played: list[Played]
 
+    @property
+    def steps(self) -> list[Step]:
+        """All steps, in their order."""
+        return [step for played in self.played for step in played.steps]
+
 
 def sessions_in(engine: sql.Engine) -> list[str]:
     """Identifiers of every session, the earliest first."""
-    with engine.connect() as connection:
+    with reading(engine) as connection:
         order = sql.select(SESSIONS.c.session).order_by(SESSIONS.c.began)
         return list(connection.execute(order).scalars())
 
@@ -223,7 +269,7 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
     Returns:
         The record; None if there is none.
     """
-    with engine.connect() as connection:
+    with reading(engine) as connection:
         of = {table: table.c.session == session for table in (SESSIONS, EPISODES, STEPS)}
         found = connection.execute(sql.select(SESSIONS).where(of[SESSIONS])).mappings().first()
         if found is None:
@@ -241,3 +287,19 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
         for row in connection.execute(steps).mappings():
             played[int(row["episode"])].steps.append(step_of_row(row))
     return Recorded(session, int(found["seed"]), json.loads(found["setup"]), played)
+
+
+def read_times(engine: sql.Engine, session: str) -> list[dict[str, Any]]:
+    """The device and the times of each step of a session, in their order, see `TIMES`."""
+    columns = (STEPS.c.device, *(STEPS.c[name] for name in TIMES))
+    with reading(engine) as connection:
+        order = sql.select(*columns).where(STEPS.c.session == session).order_by(STEPS.c.number)
+        return [dict(row) for row in connection.execute(order).mappings()]
+
+
+def read_notes(engine: sql.Engine, session: str) -> list[dict[str, Any]]:
+    """What else happened in a session: `session`, `time`, `kind`, and `content` as JSON."""
+    columns = (NOTES.c.session, NOTES.c.time, NOTES.c.kind, NOTES.c.content)
+    with reading(engine) as connection:
+        order = sql.select(*columns).where(NOTES.c.session == session).order_by(NOTES.c.note)
+        return [dict(row) for row in connection.execute(order).mappings()]

@@ -7,6 +7,11 @@ from concurrent.futures import Future
 from typing import Any, NamedTuple
 
 import sqlalchemy as sql
+from sqlalchemy.exc import OperationalError
+
+from qbumpers.errors import RequestError
+from qbumpers.study.stores import is_postgresql, share_locks, writing
+from qbumpers.study.tables import Tenure, latest_tenures
 
 Row = tuple[sql.Table, Mapping[str, Any]]
 """A table, and the columns of a row for it."""
@@ -14,17 +19,26 @@ Row = tuple[sql.Table, Mapping[str, Any]]
 _MOST = 512  # additions per transaction
 
 
+class TakenOverError(RequestError):
+    """Another server has taken a session; nothing more can be added to it from here."""
+
+
+class UnreachableError(Exception):
+    """The database cannot be reached just now; whether it has the addition, it alone can say."""
+
+
 class _Addition(NamedTuple):
     rows: Sequence[Row]
+    tenure: Tenure | None
     lasting: bool
     done: "Future[None]"
 
 
 class Writer:
-    """Adds rows to a records file; every addition is whole or not there at all.
+    """Adds rows to records; every addition is whole or not there at all.
 
     Args:
-        engine: of the file; no one else may write to it.
+        engine: of the records; other processes may add to them too.
     """
 
     def __init__(self, engine: sql.Engine) -> None:
@@ -33,20 +47,26 @@ class Writer:
         self._thread = threading.Thread(target=self._write, name="records", daemon=True)
         self._thread.start()
 
-    def add(self, rows: Sequence[Row], *, lasting: bool = False) -> "Future[None]":
+    def add(
+        self, rows: Sequence[Row], tenure: Tenure | None = None, *, lasting: bool = False
+    ) -> "Future[None]":
         """Add rows.
 
         Args:
             rows: those of a table are added in their order.
+            tenure: by which they are added to a session that others may take; None for rows of no
+                session, or of a new one.
             lasting: whether they must also survive a power cut; without it, they survive the end
                 of the server however it comes.
 
         Returns:
-            Done once they are committed; its exception says why they could not be.
+            Done once they are committed; its exception says why they could not be: a
+            `TakenOverError` if the session has been taken, an `UnreachableError` if a database
+            cannot be reached.
         """
         done: Future[None] = Future()
         done.set_running_or_notify_cancel()  # what was asked for is written, whoever waits
-        self._waiting.put(_Addition(rows, lasting, done))
+        self._waiting.put(_Addition(rows, tenure, lasting, done))
         return done
 
     def close(self) -> None:
@@ -56,13 +76,12 @@ class Writer:
         self._engine.dispose()
 
     def _write(self) -> None:
-        with self._engine.connect() as connection:
-            closing = False
-            while not closing:
-                group, closing = self._group()
-                if group and not self._committed(connection, group):
-                    for addition in group:  # one that fails must not take others with it
-                        self._committed(connection, [addition], last=True)
+        closing = False
+        while not closing:
+            group, closing = self._group()
+            if group and not self._committed(group, last=len(group) == 1):
+                for addition in group:  # one that fails must not take others with it
+                    self._committed([addition], last=True)
 
     def _group(self) -> tuple[list[_Addition], bool]:
         """What is waiting now, and whether the end has come."""
@@ -74,23 +93,43 @@ class Writer:
             group.append(addition)
         return group, False
 
-    def _committed(
-        self, connection: sql.Connection, group: Sequence[_Addition], last: bool = False
-    ) -> bool:
-        """Whether a group could be committed; if not, whoever waits learns why if it was `last`."""
-        lasting = any(addition.lasting for addition in group)
+    def _committed(self, group: Sequence[_Addition], last: bool = False) -> bool:
+        """Whether whoever waits knows how it went: not if one of several failed."""
         try:
-            _set_synchronous(connection, "FULL" if lasting else "NORMAL")
-            with connection.begin():
+            lasting = any(addition.lasting for addition in group)
+            with writing(self._engine, lasting=lasting) as connection:
+                _check_tenures(connection, group)
                 for table, rows in _by_table(group).items():
                     connection.execute(table.insert(), rows)  # many rows at once take less time
         except Exception as error:  # whatever it is, those who wait must hear of it
-            if last:
-                group[0].done.set_exception(error)
-            return False
-        for addition in group:
-            addition.done.set_result(None)
+            if isinstance(error, OperationalError) and is_postgresql(self._engine):
+                reason = str(error.orig).strip().partition("\n")[0]
+                _fail(group, UnreachableError(reason))
+            elif last:
+                _fail(group, error)
+            else:
+                return False
+        else:
+            for addition in group:
+                addition.done.set_result(None)
         return True
+
+
+def _fail(group: Sequence[_Addition], error: Exception) -> None:
+    for addition in group:
+        addition.done.set_exception(error)
+
+
+def _check_tenures(connection: sql.Connection, group: Sequence[_Addition]) -> None:
+    """Refuse to add to sessions that have been taken; none can be until the transaction ends."""
+    tenures = {addition.tenure for addition in group if addition.tenure is not None}
+    if not tenures:
+        return
+    sessions = sorted({tenure.session for tenure in tenures})
+    share_locks(connection, sessions)
+    latest = latest_tenures(connection, sessions)
+    if any(latest.get(tenure.session) != tenure.number for tenure in tenures):
+        raise TakenOverError("this session goes on in another tab or window")
 
 
 def _by_table(group: Sequence[_Addition]) -> dict[sql.Table, list[Mapping[str, Any]]]:
@@ -99,8 +138,3 @@ def _by_table(group: Sequence[_Addition]) -> dict[sql.Table, list[Mapping[str, A
         for table, row in addition.rows:
             found.setdefault(table, []).append(row)
     return found
-
-
-def _set_synchronous(connection: sql.Connection, how: str) -> None:
-    raw: Any = connection.connection.dbapi_connection
-    raw.execute(f"PRAGMA synchronous = {how}")
