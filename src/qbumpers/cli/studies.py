@@ -11,7 +11,7 @@ from qbumpers.cli.study import check_installed, study
 from qbumpers.errors import counted
 
 if TYPE_CHECKING:
-    from qbumpers.study.design.models import Study
+    from qbumpers.studies.design.models import Study
 
 File = Annotated[Path, typer.Argument(help="The study file.", metavar="STUDY.toml")]
 
@@ -27,7 +27,7 @@ def new_study(file: File) -> None:
     Example: qbumpers study new my-study.toml
     """
     check_installed()
-    from qbumpers.study.design.sources import write_new
+    from qbumpers.studies.design.sources import write_new
 
     write_new(file)
     _say(f"{file} is written: change it, then: qbumpers study check {file}")
@@ -40,7 +40,7 @@ def check_study(file: File) -> None:
     Example: qbumpers study check my-study.toml
     """
     check_installed()
-    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.studies.design.sources import check_playable, load_study
 
     design = load_study(file)
     check_playable(design)
@@ -51,7 +51,7 @@ def check_study(file: File) -> None:
 
 def _described(design: "Study") -> list[str]:
     """What a study comes to, a line each."""
-    from qbumpers.study.design.parts import Block, Sitting
+    from qbumpers.studies.design.parts import Block, Sitting
 
     conditions = [condition.name for condition in design.all_conditions()]
     blocks = [
@@ -97,9 +97,9 @@ def serve_study(
     Example: qbumpers study serve my-study.toml
     """
     check_installed()
-    from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.running import opened, records_of, serve
-    from qbumpers.study.flow.server import StudyHost
+    from qbumpers.studies.design.sources import check_playable, load_study
+    from qbumpers.studies.flow.running import opened, records_of, serve
+    from qbumpers.studies.flow.server import StudyHost
 
     design = load_study(file)
     setups = check_playable(design)
@@ -131,10 +131,10 @@ def simulate_study(
     Example: qbumpers study simulate my-study.toml --participants 90
     """
     check_installed()
-    from qbumpers.study.bots.browser import by_browser
-    from qbumpers.study.bots.rehearsing import by_socket, rehearse, without_waiting
-    from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.running import opened, records_of
+    from qbumpers.studies.bots.browser import by_browser
+    from qbumpers.studies.bots.rehearsing import by_socket, rehearse, without_waiting
+    from qbumpers.studies.design.sources import check_playable, load_study
+    from qbumpers.studies.flow.running import opened, records_of
 
     design = load_study(file)
     setups = check_playable(design)
@@ -167,8 +167,8 @@ def freeze_study(file: File) -> None:
     Example: qbumpers study freeze my-study.toml
     """
     check_installed()
-    from qbumpers.study.design.freezing import freeze, frozen_path
-    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.studies.design.freezing import freeze, frozen_path
+    from qbumpers.studies.design.sources import check_playable, load_study
 
     design = load_study(file)
     digest = freeze(file, design, check_playable(design))
@@ -187,8 +187,8 @@ def back_up_study(
     Example: qbumpers study backup my-study.toml monday.sqlite --live
     """
     check_installed()
-    from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import back_up, records_of
+    from qbumpers.studies.design.sources import load_study
+    from qbumpers.studies.flow.running import back_up, records_of
 
     folder = _folder(out, load_study(file))
     back_up(records_of(folder, "live" if live else "pilot"), copy)
@@ -207,8 +207,8 @@ def restore_study(
     Example: qbumpers study restore my-study.toml monday.sqlite --live
     """
     check_installed()
-    from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of, restore
+    from qbumpers.studies.design.sources import load_study
+    from qbumpers.studies.flow.running import records_of, restore
 
     records = records_of(_folder(out, load_study(file)), "live" if live else "pilot")
     restore(copy, records)

@@ -4,9 +4,9 @@ import sqlite3
 
 import pytest
 
-from qbumpers.study.flow.standing import standing
-from qbumpers.study.flow.tables import events_of, open_study, participants_in
-from tests.study.flow.studies import CHECK, Participant, block, served_study, study_of
+from qbumpers.studies.flow.standing import standing
+from qbumpers.studies.flow.tables import events_of, open_study, participants_in
+from tests.studies.flow.studies import CHECK, Participant, block, served_study, study_of
 from tests.study.serving import RIGHT, UP
 
 WHOLE = [

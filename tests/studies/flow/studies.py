@@ -5,10 +5,10 @@ import datetime
 import secrets
 from typing import Any
 
-from qbumpers.study.bots.rehearsing import serving
-from qbumpers.study.design.sources import make_study, setups_of
-from qbumpers.study.flow.server import StudyHost
-from qbumpers.study.flow.tables import open_study
+from qbumpers.studies.bots.rehearsing import serving
+from qbumpers.studies.design.sources import make_study, setups_of
+from qbumpers.studies.flow.server import StudyHost
+from qbumpers.studies.flow.tables import open_study
 from tests.study.serving import Page
 
 CONSENT = {"kind": "consent", "version": "2", "text": "Do you agree?"}

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qbumpers.study.design.assignment import Seat, Yoke, assign, yoked_dose
-from qbumpers.study.design.conditions import Factor, crossed
+from qbumpers.studies.design.assignment import Seat, Yoke, assign, yoked_dose
+from qbumpers.studies.design.conditions import Factor, crossed
 
 HOUR = 3600.0
 

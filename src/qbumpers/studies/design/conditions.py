@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import AssistantDesign
 from qbumpers.experiments.models import Model
-from qbumpers.study.design.instruments import Identifier
+from qbumpers.studies.design.instruments import Identifier
 
 Visibility = Literal["hidden", "shown", "explained"]
 """Whether the page says that a step was overridden, and why."""

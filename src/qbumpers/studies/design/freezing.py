@@ -11,8 +11,8 @@ from typing import Any
 import qbumpers
 from qbumpers.errors import RequestError, in_short
 from qbumpers.files import write_atomically
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import Block
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import Block
 from qbumpers.study.setup import Setup
 
 _SOURCES = {".py", ".js", ".css", ".html"}

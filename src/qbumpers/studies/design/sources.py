@@ -10,10 +10,10 @@ from qbumpers.experiments.learner_designs import field_names
 from qbumpers.experiments.sources import parsed
 from qbumpers.imports import found_in
 from qbumpers.learners import learner_type
-from qbumpers.study.design.conditions import Factor, Level
-from qbumpers.study.design.instruments import Item
-from qbumpers.study.design.models import Analysis, Bonus, Recruitment, Rehearsal, Returning, Study
-from qbumpers.study.design.parts import KINDS, Block, Question
+from qbumpers.studies.design.conditions import Factor, Level
+from qbumpers.studies.design.instruments import Item
+from qbumpers.studies.design.models import Analysis, Bonus, Recruitment, Rehearsal, Returning, Study
+from qbumpers.studies.design.parts import KINDS, Block, Question
 from qbumpers.study.game import Choice, Game
 from qbumpers.study.setup import Setup
 

@@ -8,15 +8,15 @@ from typing import Any
 from urllib.parse import urlencode
 
 from qbumpers.errors import RequestError
-from qbumpers.study.bots.page import Taken
-from qbumpers.study.bots.person import Person
+from qbumpers.studies.bots.page import Taken
+from qbumpers.studies.bots.person import Person
 
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run")
 """With which Chromium is started."""
 
 
 async def by_browser(address: str, person: Person, arrival: Mapping[str, str]) -> Taken:
-    """Take part through Chromium, see `qbumpers.study.bots.rehearsing.TakePart`.
+    """Take part through Chromium, see `qbumpers.studies.bots.rehearsing.TakePart`.
 
     Raises:
         RequestError: if Chromium or Playwright is not installed.

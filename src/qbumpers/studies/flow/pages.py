@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from qbumpers.errors import RequestError
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import (
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import (
     AnyPart,
     Block,
     Comprehension,
@@ -17,8 +17,8 @@ from qbumpers.study.design.parts import (
     Questionnaire,
     Sitting,
 )
-from qbumpers.study.design.words import WORDS
-from qbumpers.study.flow.standing import Standing, window
+from qbumpers.studies.design.words import WORDS
+from qbumpers.studies.flow.standing import Standing, window
 
 _TITLES = {
     "consent": "consent_title",

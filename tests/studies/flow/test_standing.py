@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qbumpers.study.design.parts import DeviceCheck
-from qbumpers.study.flow.standing import (
+from qbumpers.studies.design.parts import DeviceCheck
+from qbumpers.studies.flow.standing import (
     DAY,
     HOUR,
     after,
@@ -16,8 +16,8 @@ from qbumpers.study.flow.standing import (
     verdict_on,
     window,
 )
-from qbumpers.study.flow.tables import Event
-from tests.study.flow.studies import CHECK, block, study_of
+from qbumpers.studies.flow.tables import Event
+from tests.studies.flow.studies import CHECK, block, study_of
 
 STUDY = study_of(
     {"kind": "instructions", "text": "Read."},

@@ -8,6 +8,14 @@ import msgspec
 from starlette.websockets import WebSocket
 
 from qbumpers.errors import RequestError
+from qbumpers.studies.design.conditions import Condition
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import Block
+from qbumpers.studies.flow.blocks import BlockPlay
+from qbumpers.studies.flow.messages import Answer, Attribute, Enter, Ping, Withdraw, decoded
+from qbumpers.studies.flow.pages import checked_content, page_of
+from qbumpers.studies.flow.standing import Standing, after
+from qbumpers.studies.flow.tables import LOG, Event, log_row
 from qbumpers.study.connection import (
     MESSAGES_PER_SECOND,
     NOT_KEPT,
@@ -15,17 +23,10 @@ from qbumpers.study.connection import (
     Connection,
     GoneError,
 )
-from qbumpers.study.design.conditions import Condition
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import Block
-from qbumpers.study.flow.blocks import BlockPlay
-from qbumpers.study.flow.messages import Answer, Attribute, Enter, Ping, Withdraw, decoded
-from qbumpers.study.flow.pages import checked_content, page_of
-from qbumpers.study.flow.standing import Standing, after
-from qbumpers.study.flow.tables import LOG, Event, log_row
 from qbumpers.study.game import Game
 from qbumpers.study.messages import Begin, Hello
 from qbumpers.study.player import Player
+from qbumpers.study.tables import Tenure
 from qbumpers.study.views import task_view
 from qbumpers.study.writing import Row, Writer
 
@@ -51,7 +52,7 @@ class Host(Protocol):
         """Write down what leads to another page, and assign a condition if it is time."""
         ...
 
-    async def game(self, visit: "Visit", block: Block) -> tuple[str, Game]:
+    async def game(self, visit: "Visit", block: Block) -> tuple[Tenure, Game]:
         """The session in which a block is played, and how far it has come."""
         ...
 
@@ -226,10 +227,10 @@ class Visit:
         if not isinstance(part, Block):
             await self._send("page", page=page)
             return
-        name, game = await self._host.game(self, part)
+        tenure, game = await self._host.game(self, part)
         condition = self._host.conditions.get(self.now.condition)
         self._block = BlockPlay(study, part, condition, self.now, game, exposed=self._host.exposed)
-        self._player = Player(name, game, self._host.writer, self._host.second, with_view=False)
+        self._player = Player(tenure, game, self._host.writer, self._host.second, with_view=False)
         await self._send("page", page={**page, **self._block.page()})
         if connection is not None:
             connection.block = self._block
@@ -252,7 +253,7 @@ class Visit:
         if self._player is None:
             raise RequestError("attribute: nothing is played")
         said = {
-            "part": part.id, "session": self._player.session, "number": message.number,
+            "part": part.id, "session": self._player.tenure.session, "number": message.number,
             "answer": message.answer, "shown": message.shown, "at": message.at,
         }  # fmt: skip
         await self.log(Event(time.time(), "attributed", said))

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from qbumpers.errors import RequestError
-from qbumpers.study.design.parts import Block
-from qbumpers.study.design.sources import (
+from qbumpers.studies.design.parts import Block
+from qbumpers.studies.design.sources import (
     EXAMPLE,
     check_playable,
     load_study,

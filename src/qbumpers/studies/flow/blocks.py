@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from qbumpers.study.design.assignment import yoked_dose
-from qbumpers.study.design.conditions import Condition
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import Block
-from qbumpers.study.flow.standing import Standing
+from qbumpers.studies.design.assignment import yoked_dose
+from qbumpers.studies.design.conditions import Condition
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import Block
+from qbumpers.studies.flow.standing import Standing
 from qbumpers.study.game import Choice, Game
 
 _ASKED_IF_OVERRIDDEN, _ASKED_IF_NOT = 0.5, 0.1

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import TaskDesign
 from qbumpers.experiments.models import Model
-from qbumpers.study.design.instruments import INSTRUMENTS, Identifier, Item
+from qbumpers.studies.design.instruments import INSTRUMENTS, Identifier, Item
 
 Text = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=1, le=10_000)]

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
-from qbumpers.study.design.conditions import Condition
+from qbumpers.studies.design.conditions import Condition
 
 Progress = Literal["complete", "ongoing", "ended"]
 

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from qbumpers.experiments.learner_designs import LearnerDesign
-from qbumpers.study.bots.mind import Mind
-from qbumpers.study.design.models import Rehearsal, Study
-from qbumpers.study.design.parts import Block, Comprehension
-from qbumpers.study.flow.standing import training_of
+from qbumpers.studies.bots.mind import Mind
+from qbumpers.studies.design.models import Rehearsal, Study
+from qbumpers.studies.design.parts import Block, Comprehension
+from qbumpers.studies.flow.standing import training_of
 from qbumpers.study.setup import Setup
 
 

@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from qbumpers.errors import RequestError
-from qbumpers.study.bots.person import Person
+from qbumpers.studies.bots.person import Person
 
 
 class Taken(NamedTuple):

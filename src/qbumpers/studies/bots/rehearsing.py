@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import uvicorn
 
 from qbumpers.errors import RequestError
-from qbumpers.study.bots.page import BotPage, Taken
-from qbumpers.study.bots.person import Person
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import Sitting
-from qbumpers.study.flow.server import PAGE, StudyHost
+from qbumpers.studies.bots.page import BotPage, Taken
+from qbumpers.studies.bots.person import Person
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import Sitting
+from qbumpers.studies.flow.server import PAGE, StudyHost
 from qbumpers.study.running import configuration, listening_at
 from qbumpers.study.server import make_application
 from qbumpers.study.setup import Setup

@@ -17,14 +17,13 @@ from starlette.routing import BaseRoute, Route
 
 import qbumpers
 from qbumpers.errors import RequestError
-from qbumpers.study.connection import MESSAGES_PER_SECOND, GoneError
-from qbumpers.study.design.assignment import Assigned, Seat, assign
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import Block
-from qbumpers.study.flow.forgetting import delete_participant
-from qbumpers.study.flow.messages import Enter
-from qbumpers.study.flow.pages import facts_of
-from qbumpers.study.flow.standing import (
+from qbumpers.studies.design.assignment import Assigned, Seat, assign
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import Block
+from qbumpers.studies.flow.forgetting import delete_participant
+from qbumpers.studies.flow.messages import Enter
+from qbumpers.studies.flow.pages import facts_of
+from qbumpers.studies.flow.standing import (
     MINUTE,
     after,
     attempts_at,
@@ -34,7 +33,7 @@ from qbumpers.study.flow.standing import (
     standing,
     training_of,
 )
-from qbumpers.study.flow.tables import (
+from qbumpers.studies.flow.tables import (
     IDENTITIES,
     LOG,
     PARTICIPANTS,
@@ -45,11 +44,19 @@ from qbumpers.study.flow.tables import (
     log_row,
     session_name,
 )
-from qbumpers.study.flow.visit import StudyConnection, Visit
+from qbumpers.studies.flow.visit import StudyConnection, Visit
+from qbumpers.study.connection import MESSAGES_PER_SECOND, GoneError
 from qbumpers.study.game import Game, resumed
 from qbumpers.study.server import UnknownSessionError
 from qbumpers.study.setup import Setup
-from qbumpers.study.tables import SESSIONS, read_session, secret_of
+from qbumpers.study.tables import (
+    SESSIONS,
+    TENURES,
+    Tenure,
+    read_session,
+    secret_of,
+    take_session,
+)
 from qbumpers.study.writing import Row, Writer
 
 PAGE = "study.html"
@@ -166,7 +173,7 @@ class StudyHost:
                 found.append(seat_of(self.study, participant, at, now, heard))
         return found
 
-    async def game(self, visit: Visit, block: Block) -> tuple[str, Game]:
+    async def game(self, visit: Visit, block: Block) -> tuple[Tenure, Game]:
         """The session in which a block is played, and how far it has come.
 
         Args:
@@ -178,15 +185,17 @@ class StudyHost:
         """
         name = session_name(visit.participant, block.id, visit.now.attempt)
         setup = self._setups[block.id]
+        tenure = await asyncio.to_thread(take_session, self.engine, name)
         recorded = await asyncio.to_thread(read_session, self.engine, name)
-        if recorded is None:
-            seed = secrets.randbits(63)
-            await visit.log(rows=(self._session_row(name, seed, setup),))
-            return name, Game(setup, seed)
+        if tenure is None or recorded is None:
+            seed, tenure = secrets.randbits(63), Tenure(name, 0)
+            rows = (self._session_row(name, seed, setup), (TENURES, tenure.row()))
+            await visit.log(rows=rows)
+            return tenure, Game(setup, seed)
         difference = setup.difference(recorded.setup)
         if difference:
             raise RequestError(f"block {block.id} cannot go on: {difference}")
-        return name, await asyncio.to_thread(resumed, setup, recorded.seed, recorded.played)
+        return tenure, await asyncio.to_thread(resumed, setup, recorded.seed, recorded.played)
 
     async def delete(self, participant: str, reason: str) -> None:
         """Delete everything of a participant.

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
-from qbumpers.study.design.assignment import Progress, Seat, Yoke
-from qbumpers.study.design.models import Study
-from qbumpers.study.design.parts import (
+from qbumpers.studies.design.assignment import Progress, Seat, Yoke
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.design.parts import (
     AnyPart,
     Block,
     Comprehension,
@@ -14,7 +14,7 @@ from qbumpers.study.design.parts import (
     DeviceCheck,
     Sitting,
 )
-from qbumpers.study.flow.tables import Event
+from qbumpers.studies.flow.tables import Event
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 """In seconds."""

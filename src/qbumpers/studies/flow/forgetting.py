@@ -4,10 +4,10 @@ import datetime
 
 import sqlalchemy as sql
 
-from qbumpers.study.flow.tables import IDENTITIES, LOG, PARTICIPANTS, TOMBSTONES
-from qbumpers.study.tables import EPISODES, NOTES, SESSIONS, STEPS
+from qbumpers.studies.flow.tables import IDENTITIES, LOG, PARTICIPANTS, TOMBSTONES
+from qbumpers.study.tables import EPISODES, NOTES, SESSIONS, STEPS, TENURES
 
-_PLAYED = (SESSIONS, EPISODES, STEPS, NOTES)
+_PLAYED = (SESSIONS, TENURES, EPISODES, STEPS, NOTES)
 
 
 def delete_participant(engine: sql.Engine, participant: str, reason: str) -> bool:

@@ -12,8 +12,8 @@ from qbumpers.errors import RequestError, unknown_name
 from qbumpers.experiments.learner_designs import LearnerDesign, by_name, design_class
 from qbumpers.experiments.models import Model
 from qbumpers.imports import import_modules
-from qbumpers.study.design.conditions import Condition, Factor, Level, crossed, orders_of
-from qbumpers.study.design.parts import (
+from qbumpers.studies.design.conditions import Condition, Factor, Level, crossed, orders_of
+from qbumpers.studies.design.parts import (
     AnyPart,
     Block,
     Consent,
@@ -23,7 +23,7 @@ from qbumpers.study.design.parts import (
     Sitting,
     Text,
 )
-from qbumpers.study.design.words import WORDS
+from qbumpers.studies.design.words import WORDS
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -176,7 +176,7 @@ class Study(Model):
         factors: further ones, crossed with it.
         counterbalance: lists of ids of parts, whose order varies over participants.
         parts: in order.
-        words: in place of those of `qbumpers.study.design.words`.
+        words: in place of those of `qbumpers.studies.design.words`.
         analysis: the planned test.
         bonus: the rule of the bonus.
         rehearsal: who takes part in a rehearsal.

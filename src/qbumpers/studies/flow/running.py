@@ -11,10 +11,10 @@ import sqlalchemy as sql
 import uvicorn
 
 from qbumpers.errors import RequestError
-from qbumpers.study.design.freezing import check_frozen, content_of, hash_of
-from qbumpers.study.design.models import Study
-from qbumpers.study.flow.server import PAGE, StudyHost
-from qbumpers.study.flow.tables import open_study
+from qbumpers.studies.design.freezing import check_frozen, content_of, hash_of
+from qbumpers.studies.design.models import Study
+from qbumpers.studies.flow.server import PAGE, StudyHost
+from qbumpers.studies.flow.tables import open_study
 from qbumpers.study.running import configuration, listening_at
 from qbumpers.study.server import make_application
 from qbumpers.study.setup import Setup

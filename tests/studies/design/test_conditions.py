@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from qbumpers.study.design.conditions import Factor, crossed, orders_of
+from qbumpers.studies.design.conditions import Factor, crossed, orders_of
 
 
 def test_levels_are_crossed():
