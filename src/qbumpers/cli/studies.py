@@ -213,3 +213,30 @@ def restore_study(
     records = records_of(_folder(out, load_study(file)), "live" if live else "pilot")
     restore(copy, records)
     _say(f"{records} is as {copy}")
+
+
+Mode = Annotated[
+    str, typer.Option("--mode", help="Which records: pilot, live or simulated.", metavar="MODE")
+]
+
+
+def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
+    """Export a study: for load, report and fit, and as a Psych-DS data set.
+
+    Args:
+        file: of the study.
+        to: folder for the files.
+        mode: which records.
+        folder: of the records; results/NAME if None.
+    """
+    from qbumpers.studies.design.sources import check_playable, load_study
+    from qbumpers.studies.flow.running import records_of
+    from qbumpers.studies.flow.tables import read_records
+    from qbumpers.studies.outcomes.export import DATASET, export_study
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(folder, design), mode))
+    found = export_study(engine, design, check_playable(design), to)
+    engine.dispose()
+    _say(f"{counted(found.participants, 'participant')} in {to / DATASET}")
+    _say(f"{counted(found.reported, 'complete one')} for: qbumpers report {to}")

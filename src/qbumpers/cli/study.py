@@ -172,18 +172,34 @@ def replay_records(
 
 @study.command("export")
 def export(
-    records: Records,
+    records: Annotated[
+        str,
+        typer.Argument(help="What play recorded, or a study file.", metavar="RECORDS|STUDY.toml"),
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the files.", metavar="DIR")],
+    mode: Annotated[
+        str, typer.Option(help="Of a study: live, pilot or simulated.", metavar="MODE")
+    ] = "live",
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Of a study's records.", show_default="results/NAME", metavar="DIR"),
+    ] = None,
     imports: Imports = None,
 ) -> None:
     """Write what was played as an experiment's files, a participant in the place of a trial.
 
-    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them.
+    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them. A study is also written as a
+    Psych-DS data set.
 
     Example: qbumpers study export results/play/play.sqlite --out results/played
     """
     check_installed()
     import_modules(imports or (), "--import")
+    if records.endswith(".toml"):
+        from qbumpers.cli.studies import export_data
+
+        export_data(Path(records), out, mode, folder)
+        return
     from qbumpers.experiments.participants import STEPS, export_records
 
     for found in export_records(records, out):
