@@ -8,7 +8,7 @@ from rich.markup import escape
 
 from qbumpers.cli.console import OUTPUT
 from qbumpers.cli.study import check_installed, study
-from qbumpers.errors import counted
+from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
     from qbumpers.studies.design.models import Study
@@ -240,3 +240,121 @@ def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
     engine.dispose()
     _say(f"{counted(found.participants, 'participant')} in {to / DATASET}")
     _say(f"{counted(found.reported, 'complete one')} for: qbumpers report {to}")
+
+
+@study.command("power")
+def power_of_study(file: File, mode: Mode = "simulated", out: Folder = None) -> None:
+    """Say how many participants the planned test needs, from those of a rehearsal.
+
+    Example: qbumpers study power my-study.toml
+    """
+    check_installed()
+    from qbumpers.studies.design.sources import load_study
+    from qbumpers.studies.flow.running import records_of
+    from qbumpers.studies.flow.tables import read_records
+    from qbumpers.studies.outcomes.power import power_of
+    from qbumpers.studies.outcomes.reading import read_participants
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    found = power_of(design, read_participants(engine, design))
+    first, second = found.analysis.arms
+    _say(
+        f"{found.analysis.measure}: {first} {found.means[0]:.1f} (n = {found.arms[0]}), {second} "
+        f"{found.means[1]:.1f} (n = {found.arms[1]}); d = {found.effect:.2f}"
+    )
+    _say("per arm   power   95% interval   without an effect")
+    for row in found.table:
+        _say(f"{row.size:7d}   {row.power:5.2f}   {row.low:.2f} to {row.high:.2f}   {row.null:.2f}")
+    most = found.table[-1].size
+    low, needed, high = (
+        str(n or f"more than {most}") for n in (found.low, found.needed, found.high)
+    )
+    _say(f"For power {found.analysis.power}: {needed} per arm (95% interval {low} to {high}).")
+
+
+@study.command("forget")
+def forget_participant(
+    file: File,
+    participant: Annotated[
+        str | None, typer.Argument(help="Identifier, or PROLIFIC_PID or class code.", metavar="ID")
+    ] = None,
+    identities: Annotated[
+        bool, typer.Option("--identities", help="Delete all identities instead; data stay.")
+    ] = False,
+    mode: Mode = "live",
+    out: Folder = None,
+) -> None:
+    """Delete everything of a participant, exports included, and leave a dated tombstone.
+
+    Example: qbumpers study forget my-study.toml 4f1c0a9d2b7e6c85
+    """
+    check_installed()
+    from qbumpers.studies.design.sources import check_playable, load_study
+    from qbumpers.studies.flow.forgetting import delete_identities
+    from qbumpers.studies.flow.running import records_of
+    from qbumpers.studies.flow.tables import read_records
+    from qbumpers.studies.outcomes.deletion import forget
+
+    if (participant is None) != identities:
+        raise RequestError("forget: give the ID of a participant, or --identities")
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    if participant is None:
+        _say(f"identities deleted: {delete_identities(engine)}; what they did stays")
+        return
+    reached = forget(engine, design, check_playable(design), participant)
+    _say("deleted; a dated tombstone says that somebody was")
+    for folder in reached:
+        _say(f"written anew without them: {folder}")
+
+
+@study.command("reconcile")
+def reconcile_study(
+    file: File,
+    table: Annotated[
+        Path, typer.Argument(help="Submissions as Prolific exports them.", metavar="TABLE.csv")
+    ],
+    mode: Mode = "live",
+    out: Folder = None,
+) -> None:
+    """Compare with Prolific's table: who completed there and not here, and the reverse.
+
+    Exit status 1 if there is any.
+
+    Example: qbumpers study reconcile my-study.toml prolific_export.csv
+    """
+    check_installed()
+    from qbumpers.studies.design.sources import load_study
+    from qbumpers.studies.flow.running import records_of
+    from qbumpers.studies.flow.tables import read_records
+    from qbumpers.studies.outcomes.reading import read_participants
+    from qbumpers.studies.outcomes.recruitment import identities_in, reconcile
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    everybody = read_participants(engine, design)
+    found = reconcile(design, everybody, identities_in(engine), table)
+    for each in found:
+        _say(f"{each.identity}: there {each.there}; here {each.here}")
+    if found:
+        raise typer.Exit(1)
+    _say("OK: both say the same")
+
+
+@study.command("bonus")
+def bonus_of_study(file: File, mode: Mode = "live", out: Folder = None) -> None:
+    """Print the bonuses by the rule of the study, as Prolific takes them.
+
+    Example: qbumpers study bonus my-study.toml
+    """
+    check_installed()
+    from qbumpers.studies.design.sources import load_study
+    from qbumpers.studies.flow.running import records_of
+    from qbumpers.studies.flow.tables import read_records
+    from qbumpers.studies.outcomes.reading import read_participants
+    from qbumpers.studies.outcomes.recruitment import bonus_table, identities_in
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    print(bonus_table(design, read_participants(engine, design), identities_in(engine)), end="")

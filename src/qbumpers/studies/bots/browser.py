@@ -73,7 +73,11 @@ class _BrowserPage:
 
     def _listen(self, socket: Any) -> None:
         heard = self._heard
-        socket.on("framereceived", lambda text: heard.put_nowait(json.loads(text)))
+
+        def take(text: str | bytes) -> None:
+            heard.put_nowait(json.loads(text))
+
+        socket.on("framereceived", take)
 
     async def _turn_page(self) -> None:
         page, kind = self._page, self._shown["kind"]

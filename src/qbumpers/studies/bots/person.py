@@ -120,7 +120,7 @@ class Person:
 
     def _answer_to(self, item: Mapping[str, Any]) -> Any:
         if item["kind"] == "choice":
-            return str(self.chance.choice(item["options"]))
+            return str(item["options"][int(self.chance.integers(len(item["options"])))])
         if item["kind"] == "text":
             return "by trying"
         steps = int((item["most"] - item["least"]) // item["step"])

@@ -92,8 +92,7 @@ def _arrived(study: Study, before: Standing, event: Event) -> Standing:
 
 def _assigned(study: Study, before: Standing, event: Event) -> Standing:
     content: Mapping[str, Any] = event.content
-    theirs: list[list[int]] = [content["lengths"], content["overrides"]]
-    yoke = Yoke(*(tuple(each) for each in theirs)) if content["partner"] else None
+    yoke = _yoke(content["lengths"], content["overrides"]) if content["partner"] else None
     return before._replace(
         parts=tuple(study.orders()[content["order"]]),
         condition=content["condition"],
@@ -101,6 +100,10 @@ def _assigned(study: Study, before: Standing, event: Event) -> Standing:
         partner=content["partner"],
         yoke=yoke,
     )
+
+
+def _yoke(lengths: Sequence[int], overrides: Sequence[int]) -> Yoke:
+    return Yoke(tuple(lengths), tuple(overrides))
 
 
 def _answered(study: Study, before: Standing, event: Event) -> Standing:

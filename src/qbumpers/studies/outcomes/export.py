@@ -157,6 +157,19 @@ def _row(number: int, first: Episode, second: Episode, *, retention: bool) -> di
     }
 
 
+def id_of(condition: Condition) -> str:
+    """The id that a condition has in an experiment's files, which begins with the rule.
+
+    Args:
+        condition: of the study.
+
+    Returns:
+        For instance "stochastic-q-bumpers/condition=bumpers".
+    """
+    rule = "random-override" if condition.yoked_to else condition.assistant
+    return f"{rule}/condition={condition.name.replace('/', '+')}"
+
+
 def _named(condition: Condition) -> NamedCondition:
     """A condition of the study as an experiment has it; a yoked one is helped at random."""
     if condition.yoked_to:
@@ -164,7 +177,7 @@ def _named(condition: Condition) -> NamedCondition:
     else:
         assistant = make_assistant(condition.assistant, **condition.options)
     learner = _experiment({}).learners[0]
-    return NamedCondition(condition.name, assistant, learner, PARTICIPANT)
+    return NamedCondition(id_of(condition), assistant, learner, PARTICIPANT)
 
 
 def _experiment(settings: Mapping[str, Any]) -> Experiment:
@@ -186,10 +199,11 @@ def _write_experiment(
     there = {each.now.condition for each in whole}
     conditions = [c for c in study.all_conditions() if c.name in there]
     noted = [recorded(_named(condition)) for condition in conditions]
-    counts = dict.fromkeys(there, 0)
+    abouts = {c.name: one for c, one in zip(conditions, noted, strict=True)}
+    counts = {about.condition: 0 for about in noted}
     rows: list[dict[str, Any]] = []
     for each in whole:
-        about = next(one for one in noted if one.condition == each.now.condition)
+        about = abouts[each.now.condition]
         trial = counts[about.condition]
         counts[about.condition] += 1
         fixed = {
@@ -197,7 +211,7 @@ def _write_experiment(
             "learner": PARTICIPANT, "trial": trial,
         }  # fmt: skip
         rows += [{**fixed, **row} for row in _rows(study, each)]
-    order = [condition.name for condition in conditions]
+    order = list(counts)
     rows.sort(key=lambda row: (order.index(row["condition"]), row["trial"], row["episode"]))
     training = next(p for p in study.parts if isinstance(p, Block) and p.phase == "training")
     setup = setups[training.id]

@@ -255,7 +255,7 @@ def _attributions(study: Study, participants: Sequence[Participant]) -> Table:
             for number, step in enumerate(step for steps in block.steps for step in steps)
         }
         for event in each.events:
-            key = event.content.get("session"), event.content.get("number")
+            key = (str(event.content.get("session")), int(event.content.get("number") or 0))
             if event.kind == "attributed" and key in steps:
                 rows.append({
                     "participant": each.name,
