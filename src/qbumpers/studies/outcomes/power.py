@@ -88,7 +88,7 @@ def power_of(study: Study, participants: Sequence[Participant]) -> Power:
 
     Arms are drawn with replacement from the rehearsal's participants, and tested. Its uncertainty
     comes from drawing the rehearsal's participants themselves again; without an effect, both arms
-    are shifted to the same mean.
+    are drawn from everybody.
 
     Args:
         study: with a planned test.
@@ -107,13 +107,13 @@ def power_of(study: Study, participants: Sequence[Participant]) -> Power:
         )
     generator = np.random.default_rng([study.seed, *b"Power"])
     pools = [(_again(first, generator), _again(second, generator)) for _ in range(_POOLS)]
+    everybody = np.concatenate([first, second])
     level, rows, curves = analysis.level, list[PowerAt](), list[list[float]]()
     for size in SIZES:
         power = found_share(first, second, size, level, generator)
         others = [found_share(*pool, size, level, generator) for pool in pools]
         low, high = np.quantile(others, [0.025, 0.975]).tolist()
-        shifted = (first - first.mean(), second - second.mean())
-        null = found_share(*shifted, size, level, generator)
+        null = found_share(everybody, everybody, size, level, generator)
         rows.append(PowerAt(size, power, low, high, null))
         curves.append(others)
     needed = _first_enough([row.power for row in rows], analysis.power)
