@@ -112,7 +112,7 @@ def serve_study(
         _say("Ctrl-C ends it.")
 
     try:
-        serve(host, port=port, browser=browser, announce=announce)
+        serve(host, setups, port=port, browser=browser, announce=announce)
     except KeyboardInterrupt:
         OUTPUT.print("\nStopped; what happened is kept.")
 
@@ -264,7 +264,8 @@ def power_of_study(file: File, mode: Mode = "simulated", out: Folder = None) -> 
         f"{found.means[1]:.1f} (n = {found.arms[1]}); d = {found.effect:.2f}"
     )
     _say("per arm   power   95% interval   without an effect")
-    for row in found.table:
+    plenty = next((place for place, row in enumerate(found.table) if row.power >= 0.99), None)
+    for row in found.table[: None if plenty is None else plenty + 1]:
         _say(f"{row.size:7d}   {row.power:5.2f}   {row.low:.2f} to {row.high:.2f}   {row.null:.2f}")
     most = found.table[-1].size
     low, needed, high = (

@@ -13,6 +13,7 @@ import uvicorn
 from qbumpers.errors import RequestError
 from qbumpers.studies.design.freezing import check_frozen, content_of, hash_of
 from qbumpers.studies.design.models import Study
+from qbumpers.studies.flow.researcher import researcher_routes
 from qbumpers.studies.flow.server import PAGE, StudyHost
 from qbumpers.studies.flow.tables import open_study
 from qbumpers.study.running import configuration, listening_at
@@ -52,12 +53,18 @@ def opened(
 
 
 def serve(
-    host: StudyHost, *, port: int, browser: bool, announce: Callable[[str, str], None]
+    host: StudyHost,
+    setups: Mapping[str, Setup],
+    *,
+    port: int,
+    browser: bool,
+    announce: Callable[[str, str], None],
 ) -> None:
     """Serve a study on this machine until Ctrl-C.
 
     Args:
         host: of the study.
+        setups: what is played in each block, by its id.
         port: of 127.0.0.1; any that is free if 0.
         browser: whether to open the page in a browser.
         announce: is called with the page's URL, and the researcher's, before anyone is served.
@@ -72,7 +79,8 @@ def serve(
         announce(url, f"{url}researcher")
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
-        application = make_application(host, hosts, PAGE, host.routes())
+        routes = [*host.routes(), *researcher_routes(host, setups)]
+        application = make_application(host, hosts, PAGE, routes)
         uvicorn.Server(configuration(application)).run([listening])
 
 

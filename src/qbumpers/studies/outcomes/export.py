@@ -50,7 +50,12 @@ class Exported(NamedTuple):
 
 
 def export_study(
-    engine: sql.Engine, study: Study, setups: Mapping[str, Setup], folder: Path
+    engine: sql.Engine,
+    study: Study,
+    setups: Mapping[str, Setup],
+    folder: Path,
+    *,
+    noted: bool = True,
 ) -> Exported:
     """Write what participants did: for `load` and the report, and as a Psych-DS data set.
 
@@ -63,6 +68,7 @@ def export_study(
         study: whose records they are.
         setups: what is played in each block, by its id.
         folder: of the files; what an earlier export left there is written anew.
+        noted: whether the folder is noted, so that deleting a participant reaches it.
 
     Returns:
         What was exported.
@@ -85,7 +91,8 @@ def export_study(
         for name in (EXPERIMENT, CONDITIONS, EPISODES, VALUES):
             place.remove(name)
     _write_steps(place, study, participants)
-    _note(engine, folder)
+    if noted:
+        _note(engine, folder)
     return Exported(len(participants), len(whole), folder)
 
 
