@@ -4,6 +4,7 @@ import copy
 import datetime
 import re
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -186,3 +187,8 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
     (tmp_path / "bad.toml").write_text("name = ", encoding="utf-8")
     with pytest.raises(RequestError, match="not valid TOML"):
         load_study(tmp_path / "bad.toml")
+
+
+def test_the_example_that_ships_is_the_one_that_a_new_file_begins_as():
+    shipped = Path(__file__).parents[3] / "examples" / "study.toml"
+    assert shipped.read_text(encoding="utf-8") == EXAMPLE.read_text(encoding="utf-8")
