@@ -7,6 +7,7 @@ from typing import Any
 
 from qbumpers.studies.bots.rehearsing import serving
 from qbumpers.studies.design.sources import make_study, setups_of
+from qbumpers.studies.flow.researcher import researcher_routes
 from qbumpers.studies.flow.server import StudyHost
 from qbumpers.studies.flow.tables import open_study
 from tests.study.serving import Page
@@ -45,7 +46,11 @@ def served_study(study, path, mode="pilot", **options):
     """The address of a study that is served from a thread, and its host."""
     engine = open_study(path, study.name, mode, "digest")
     setups = setups_of(study)
-    with serving(lambda: StudyHost(study, setups, engine, mode, second=0.01, **options)) as served:
+
+    def make():
+        return StudyHost(study, setups, engine, mode, second=0.01, **options)
+
+    with serving(make, lambda host: researcher_routes(host, setups)) as served:
         yield served
 
 

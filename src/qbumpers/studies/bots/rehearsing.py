@@ -4,10 +4,11 @@ import asyncio
 import contextlib
 import threading
 from collections import Counter
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import uvicorn
+from starlette.routing import BaseRoute
 
 from qbumpers.errors import RequestError
 from qbumpers.studies.bots.page import BotPage, Taken
@@ -48,11 +49,15 @@ def without_waiting(study: Study) -> Study:
 
 
 @contextlib.contextmanager
-def serving(make_host: Callable[[], StudyHost]) -> Generator[tuple[str, StudyHost], None, None]:
+def serving(
+    make_host: Callable[[], StudyHost],
+    more: Callable[[StudyHost], Sequence[BaseRoute]] = lambda host: (),
+) -> Generator[tuple[str, StudyHost], None, None]:
     """A study on this machine, served from a thread.
 
     Args:
         make_host: makes the study that is served.
+        more: further routes, for instance the researcher's.
 
     Yields:
         The address, "host:port", and the study.
@@ -60,7 +65,7 @@ def serving(make_host: Callable[[], StudyHost]) -> Generator[tuple[str, StudyHos
     with contextlib.closing(listening_at(0)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
         host = make_host()
-        application = make_application(host, [address], PAGE, host.routes())
+        application = make_application(host, [address], PAGE, [*host.routes(), *more(host)])
         server = uvicorn.Server(configuration(application))
         thread = threading.Thread(target=server.run, args=[[listening]], daemon=True)
         thread.start()

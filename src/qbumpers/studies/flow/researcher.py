@@ -118,8 +118,8 @@ def _curves(host: StudyHost, places: Mapping[str, Standing]) -> list[dict[str, A
         for row in connection.execute(query):
             name, block, _ = row.session.rsplit(".", 2)
             if block in blocks and name in places and row.events & ENDS:
-                assisted = blocks[block][row.episode]
-                key = (places[name].condition, row.episode, assisted)
+                assisted = blocks[block][int(row.episode)]
+                key = (places[name].condition, int(row.episode), assisted)
                 scores.setdefault(key, []).append(float(row.score))
     found: list[dict[str, Any]] = []
     for (condition, episode, assisted), values in sorted(scores.items()):

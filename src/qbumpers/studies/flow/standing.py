@@ -92,7 +92,7 @@ def _arrived(study: Study, before: Standing, event: Event) -> Standing:
 
 def _assigned(study: Study, before: Standing, event: Event) -> Standing:
     content: Mapping[str, Any] = event.content
-    yoke = _yoke(content["lengths"], content["overrides"]) if content["partner"] else None
+    yoke = _yoke(content) if content["partner"] else None
     return before._replace(
         parts=tuple(study.orders()[content["order"]]),
         condition=content["condition"],
@@ -102,8 +102,8 @@ def _assigned(study: Study, before: Standing, event: Event) -> Standing:
     )
 
 
-def _yoke(lengths: Sequence[int], overrides: Sequence[int]) -> Yoke:
-    return Yoke(tuple(lengths), tuple(overrides))
+def _yoke(content: Mapping[str, Sequence[int]]) -> Yoke:
+    return Yoke(tuple(content["lengths"]), tuple(content["overrides"]))
 
 
 def _answered(study: Study, before: Standing, event: Event) -> Standing:

@@ -67,6 +67,7 @@ export class Game {
     byId("help").textContent = this.#realTime ? this.words.keys_clock : this.words.keys_turns;
     this.#setPaused(false);
     this.board.show(task);
+    this.board.draw([], 0, () => {}); // nothing of the block before
     this.input.show(task);
     if (this.#page.over) this.#offerEnd("", "");
     else this.#offer("", "", [[this.#page.played ? this.words.play_next : this.words.play, () => this.#begin(this.#page.played)]]);
