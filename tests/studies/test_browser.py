@@ -250,3 +250,35 @@ def test_the_researcher_sees_who_is_where(server, open_page, device, scheme):
     with page.expect_download() as download:
         page.click("#export")
     assert download.value.suggested_filename == "study.zip"
+
+
+def test_simulated_learners_take_part_in_the_browser(tmp_path):
+    if shutil.which("chromium") is None:
+        pytest.skip("chromium is not installed: .ci/install_browser")
+    pytest.importorskip("playwright.async_api")
+    from qbumpers.studies.bots.browser import by_browser
+    from qbumpers.studies.bots.rehearsing import rehearse
+    from qbumpers.studies.design.sources import setups_of
+    from qbumpers.studies.flow.tables import open_study
+    from qbumpers.studies.outcomes.reading import read_participants
+    from tests.studies.flow.studies import CHECK, block, study_of
+
+    study = study_of(
+        {"kind": "device-check"}, CHECK, block("training", 1, probe_every=1, attribution=3),
+        {"kind": "questionnaire", "instrument": "nasa-tlx"},
+        {"kind": "questionnaire", "instrument": "trust"},
+        {"kind": "questionnaire", "instrument": "background"},
+        rehearsal={"drop_out": 0.0, "reload": 1.0},
+    )  # fmt: skip
+    path, setups = tmp_path / "simulated.sqlite", setups_of(study)
+    engine = open_study(path, study.name, "simulated", "digest")
+    found = rehearse(study, setups, engine, 2, take_part=by_browser, at_once=1)
+    assert found.outcomes == {"complete": 2}
+    engine = open_study(path, study.name, "simulated", "digest")
+    for participant in read_participants(engine, study):
+        assert [episode.length for episode in participant.blocks[0].episodes] == [4, 4]
+        assert {step["device"] for step in participant.blocks[0].times} == {"keyboard"}
+        answers = participant.answers()
+        assert answers["nasa-tlx"].content["content"]["effort"] % 5 == 0
+        assert answers["device-check"].content["content"]["refresh"] > 0
+    engine.dispose()

@@ -1,5 +1,6 @@
 """Commands of `qbumpers study` for studies with participants."""
 
+import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -46,7 +47,16 @@ def check_study(file: File) -> None:
     check_playable(design)
     for line in _described(design):
         _say(line)
+    _warn_of_identities(file, design)
     _say("OK")
+
+
+def _warn_of_identities(file: Path, design: "Study") -> None:
+    if datetime.datetime.now(datetime.UTC).date() > design.keep_identities_until:
+        _say(
+            f"Identities were to be kept until {design.keep_identities_until}: delete them, by "
+            f"qbumpers study forget {file} --identities"
+        )
 
 
 def _described(design: "Study") -> list[str]:
@@ -103,6 +113,7 @@ def serve_study(
 
     design = load_study(file)
     setups = check_playable(design)
+    _warn_of_identities(file, design)
     mode, folder = "live" if live else "pilot", _folder(out, design)
     host = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
 

@@ -74,3 +74,21 @@ def test_a_class_list_that_is_too_short_is_refused(tmp_path):
     study = study_of(block("training"), recruitment={"by": "class", "class_list": ["ab12"]})
     with pytest.raises(RequestError, match="class_list has 1 codes; simulate at most as many"):
         rehearsed(study, tmp_path, 2)
+
+
+@pytest.mark.slow
+def test_a_task_in_real_time_is_flown_by_a_learner_of_vectors(tmp_path):
+    study = study_of(
+        block("pretest"), block("training", 2, probe_every=1, attribution=2),
+        task="lunar-lander", step_limit=40,
+        conditions=[
+            {"name": "b", "assistant": {"name": "stochastic-q-bumpers", "alpha": 0.5}}
+        ],
+        rehearsal={"learners": [{"name": "double-dqn"}], "drop_out": 0.0, "reload": 1.0},
+    )  # fmt: skip
+    found, engine = rehearsed(study, tmp_path, 2)
+    assert found.outcomes == {"complete": 2}
+    for participant in read_participants(engine, study):
+        lengths = [[episode.length for episode in each.episodes] for each in participant.blocks]
+        assert lengths == [[40], [40] * 4]
+    engine.dispose()

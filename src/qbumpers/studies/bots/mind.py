@@ -7,7 +7,7 @@ import numpy as np
 
 from qbumpers.compilation import uncompiled
 from qbumpers.experiments.learner_designs import LearnerDesign
-from qbumpers.learners import Motor, PowerLaw, dispatch, perception
+from qbumpers.learners import Motor, PowerLaw, dispatch, learner_type, perception
 from qbumpers.learners.forgetting import begin_practice, practice_for, practise
 from qbumpers.learners.interface import Shape
 from qbumpers.learners.motor import move
@@ -61,6 +61,9 @@ class Mind:
         if self._stack.practice is not None:
             _begin_practice(self._stack.practice)
         self._vectors = not task.states
+        # Networks take too long as plain Python; tables take longer to compile.
+        kind = learner_type(design.name)
+        self._calls: Any = kind if self._vectors else dispatch
         self._trained = 0
         self._rates: Any = 0
         self._learns = False
@@ -91,10 +94,10 @@ class Mind:
         settings, now = self._stack.settings, self._as_state(state)
         if self._learns:
             stream = self._learning
-            meant = dispatch.choose(settings, self._memory, now, self._rates, stream)
+            meant = self._calls.choose(settings, self._memory, now, self._rates, stream)
         else:
             stream = self._testing
-            meant = dispatch.prefer(settings, self._memory, now, draw(stream))
+            meant = self._calls.prefer(settings, self._memory, now, draw(stream))
         self._state = now
         self._last = int(_move(self._stack.motor, int(meant), self._last, self._actions, stream))
         return self._last
@@ -120,7 +123,7 @@ class Mind:
         led = self._as_state(last["led"])
         transition = _believed(experience, self._state, led, terminated)
         settings = self._stack.settings
-        dispatch.learn(settings, self._memory, transition, self._rates, stream)
+        self._calls.learn(settings, self._memory, transition, self._rates, stream)
         _practise(self._stack.practice, self._state, experience.action)
 
     def _as_state(self, state: Any) -> Any:

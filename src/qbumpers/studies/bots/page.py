@@ -103,6 +103,8 @@ class BotPage:
             self._rate = message["task"]["rate"]
         elif kind == "state":
             await self._play(socket, message)
+        elif kind == "paused":
+            await self._send(socket, type="continue")
         elif kind == "ask":
             await self._send(
                 socket, type="attribute", number=message["number"], answer=person.attribution(),
