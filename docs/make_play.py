@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,20 +23,15 @@ TOO_SOON = ["ArrowUp", *["ArrowRight"] * 5, "ArrowDown", *["ArrowRight"] * 5]
 
 
 @contextlib.contextmanager
-def playing(*arguments: str) -> Iterator[str]:
-    """The URL of `qbumpers play`."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "qbumpers", "play", *arguments, "--out", folder]
-        with subprocess.Popen(
-            [*command, "--port", "0", "--no-browser"], stdout=subprocess.PIPE, text=True
-        ) as server:
-            assert server.stdout is not None
-            found = re.search(r"http\S+", server.stdout.readline())
-            assert found is not None
-            try:
-                yield found[0]
-            finally:
-                server.terminate()
+def serving(*arguments: str) -> Iterator[str]:
+    """The URL of a command that serves a page."""
+    command = [sys.executable, "-u", "-m", "qbumpers", *arguments, "--port", "0", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            yield next(found[0] for line in server.stdout if (found := re.search(r"http\S+", line)))
+        finally:
+            server.terminate()
 
 
 def saved(page: Any, name: str) -> None:
@@ -69,6 +64,14 @@ def lander(page: Any) -> None:
     saved(page, "play-lander.png")
 
 
+def replay(page: Any) -> None:
+    """A step of the lander that was overridden, as it is shown again."""
+    page.wait_for_selector("#log button")
+    page.click("#log button >> nth=1")
+    page.wait_for_timeout(300)
+    saved(page, "play-replay.png")
+
+
 def cliff(page: Any) -> None:
     """Some episodes with and without help, and a step that is overridden."""
     for episode, keys in enumerate([AROUND, [*TOO_SOON, "ArrowRight", "ArrowDown"]] * 2):
@@ -91,6 +94,21 @@ def phone(page: Any) -> None:
     saved(page, "play-phone.png")
 
 
+def shown(
+    browser: Any, url: str, take: Callable[[Any], None], width: int, height: int, ready: str
+) -> None:
+    """Open a page, wait until it is ready, and take its picture."""
+    page = browser.new_page(
+        viewport={"width": width, "height": height},
+        color_scheme="dark" if width < 500 else "light",
+        has_touch=width < 500,
+    )
+    page.goto(url)
+    page.wait_for_selector(ready)
+    take(page)
+    page.close()
+
+
 def main() -> None:
     """Take every picture."""
     with sync_playwright() as running:
@@ -102,16 +120,12 @@ def main() -> None:
             ("cliff-walking", cliff, 1200, 940),
             ("cliff-walking", phone, 390, 700),
         ]:
-            with playing(task, "--alpha", "0.4") as url:
-                page = browser.new_page(
-                    viewport={"width": width, "height": height},
-                    color_scheme="dark" if width < 500 else "light",
-                    has_touch=width < 500,
-                )  # fmt: skip
-                page.goto(url)
-                page.wait_for_selector("#go:visible")
-                take(page)
-                page.close()
+            with tempfile.TemporaryDirectory() as folder:
+                with serving("play", task, "--alpha", "0.4", "--out", folder) as url:
+                    shown(browser, url, take, width, height, "#go:visible")
+                if take is lander:
+                    with serving("study", "replay", f"{folder}/play.sqlite") as url:
+                        shown(browser, url, replay, width, 980, "#log")
         browser.close()
 
 

@@ -43,6 +43,7 @@ INTERNAL = ("borrowing", "cli", "compilation", "errors", "files", "kept_code", "
 INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
 SERVING = {"play"}  # goes on until it is stopped: tests/study runs it
 CITED_HOSTS = {"doi.org", "arxiv.org"}
+EXAMPLE_HOSTS = {"127.0.0.1", "lab.example.org", "study.example.org"}
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\(([^)\s]+)\)|(?:src|href)=\"([^\"]+)\"")
@@ -179,7 +180,7 @@ def test_the_fences_of_a_page_are_paired_and_of_known_languages(name):
     text = PAGES[name].read_text(encoding="utf-8")
     assert "```" not in prose_of(PAGES[name])
     languages = {block.language for block in blocks_of(PAGES[name])}
-    assert languages <= {*RUN_LANGUAGES, "bibtex", ""}
+    assert languages <= {*RUN_LANGUAGES, "bibtex", "nginx", ""}
     assert text.endswith("\n")
 
 
@@ -246,9 +247,9 @@ def test_links_and_pictures_of_a_page_exist(name):
     ],
     ids=lambda path: str(path.relative_to(ROOT)),
 )
-def test_no_page_names_a_host_but_those_of_citations(path):
+def test_no_page_names_a_host_but_those_of_citations_and_examples(path):
     hosts = re.findall(r"(?:https?:)?//([\w-]+(?:\.[\w-]+)+)", path.read_text(encoding="utf-8"))
-    assert set(hosts) <= CITED_HOSTS
+    assert set(hosts) <= CITED_HOSTS | EXAMPLE_HOSTS
 
 
 def documented():

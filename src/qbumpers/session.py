@@ -5,6 +5,7 @@ decides, keeps the account and gives the record of each step. What it is after a
 is a fold of their records, so a session can be replayed.
 """
 
+import functools
 import math
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -249,10 +250,16 @@ def noise_of(seed: int, number: int) -> Noise:
     Returns:
         The same noise for the same arguments.
     """
-    source = np.random.Philox(np.random.SeedSequence([seed, *b"Session"]))
+    source = np.random.Philox(_sequence_of(seed))
     source.advance(number)
     coin, tie = (source.random_raw(2) >> np.uint64(11)) * (1.0 / 9007199254740992.0)
     return Noise(float(coin), float(tie))
+
+
+@functools.lru_cache(1024)
+def _sequence_of(seed: int) -> np.random.SeedSequence:
+    """What a session's generator starts from, which takes longer to make than a number of it."""
+    return np.random.SeedSequence([seed, *b"Session"])
 
 
 _COMPARED = (

@@ -115,7 +115,13 @@ def test_falls_happen_once_the_budget_is_spent_which_the_bumpers_below_stop():
     assert bumpers(fall, NOISE) == Decision(1, 1.0)
 
 
-@pytest.mark.parametrize("limits", [{"in_all": 9}, {"share": 0.125, "per_episode": 1}])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"share": 0.125, "per_episode": 1},
+        pytest.param({"in_all": 9}, marks=pytest.mark.slow),
+    ],
+)
 def test_limits_do_the_same_in_every_host(limits):
     assistant = make_assistant("budget", of={"name": "correct"}, **limits)
     assert check_conformance(assistant, tasks=[slippery_corridor()])
@@ -171,6 +177,7 @@ def test_a_budget_that_is_never_spent_changes_nothing():
     assert_same(outcomes(budget(100, INNER)), outcomes(make_assistant(**INNER)))
 
 
+@pytest.mark.slow
 def test_a_nested_budget_is_simulated_as_the_smaller_one():
     smaller = outcomes(budget(3, INNER))
     assert smaller.overrides.max() == 3

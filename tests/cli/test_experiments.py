@@ -118,5 +118,5 @@ def test_a_small_version_of_figure_4_ends_with_a_report(call, tmp_path):
     given = ["--quick", "--trials", 1, "--episodes", 2]
     status, output, errors = call("reproduce", "lunar-lander", *given, "--out", tmp_path / "out")
     assert (status, errors) == (0, "")
-    assert "lunar-lander-quick-episodes-2: 4 conditions, 1 trials of 2 episodes" in words(output)
+    assert "lunar-lander-quick-episodes-2: 4 conditions, 1 trial of 2 episodes" in words(output)
     assert (tmp_path / "out" / "report.html").is_file()

@@ -1,5 +1,7 @@
 """`qbumpers play` and `qbumpers study` say what is wrong before anything starts."""
 
+import sqlite3
+
 import pytest
 
 pytest.importorskip("starlette", reason="the extra study is not installed")
@@ -16,6 +18,8 @@ pytest.importorskip("starlette", reason="the extra study is not installed")
         (["cliff-walking", "stray"], "argument 'stray': an option of the assistant begins with --"),
         (["mountain-car"], "v_min = 0 must be below the value of the start state"),
         (["cliff-walking", "--port", "99999"], "port = 99999"),
+        (["cliff-walking", "--host", "192.0.2.1"], "host = 192.0.2.1: that is another address"),
+        (["cliff-walking", "--behind-proxy", "example.org"], "behind-proxy = 'example.org'; a URL"),
         (["cliff-walking", "--records", "a.sqlite"], "records = 'a.sqlite'; postgresql://USER@HO"),
         (["cliff-walking", "--records", "mysql://me@there/x"], "records of mysql://: a file, or p"),
         (
@@ -72,3 +76,34 @@ def test_every_way_to_write_an_option_is_understood(call, monkeypatch, arguments
 def test_a_record_that_is_not_there_cannot_be_replayed(call, tmp_path):
     status, _, errors = call("study", "replay", str(tmp_path / "absent.sqlite"))
     assert (status, errors.startswith("error: records file")) == (2, True)
+
+
+def test_a_record_is_checked_without_a_page(call, tmp_path):
+    from qbumpers.study.game import Choice
+    from qbumpers.study.setup import Setup
+    from tests.study.recording import record
+
+    path = tmp_path / "play.sqlite"
+    record(Setup("cliff-walking"), path, [(Choice("none", {}), [0, 1])])
+    assert call("study", "replay", str(path), "--check") == (
+        0, "one cliff-walking: 1 episode, 2 steps: OK", ""
+    )  # fmt: skip
+    raw = sqlite3.connect(path)
+    raw.execute("update steps set reward = 3 where number = 1")
+    raw.commit()
+    raw.close()
+    status, output, _ = call("study", "replay", str(path), "--check", "--session", "one")
+    assert status == 1
+    assert "different: step 1 (episode 0): reward is -1.0, recorded 3.0" in output
+    status, _, errors = call("study", "replay", str(path), "--session", "two")
+    assert (status, errors) == (2, "error: session = 'two': the record has ['one']")
+
+
+def test_a_record_without_sessions_has_no_page(call, tmp_path):
+    from qbumpers.study.tables import open_records
+
+    path = tmp_path / "play.sqlite"
+    open_records(path).dispose()
+    assert call("study", "replay", str(path), "--check")[0] == 0
+    status, _, errors = call("study", "replay", str(path))
+    assert (status, "it has no session to be shown" in errors) == (2, True)

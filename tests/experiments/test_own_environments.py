@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from tests.experiments.with_ray import MARKS
 from tests.simulation.test_processes import SCRIPT
 
@@ -36,6 +38,7 @@ main()
 )
 
 
+@pytest.mark.slow
 def test_a_cluster_and_processes_give_the_same_bytes(tmp_path):
     finished = subprocess.run(
         [sys.executable, "-c", RUNS],

@@ -37,6 +37,7 @@ def register_guide():
     register_assistant("guide", own_rules.NoOptions)(own_rules.guide)
 
 
+@pytest.mark.slow
 def test_an_own_learner_and_rule_run_in_threads_beside_those_of_the_package(tmp_path):
     register_guide()
     register_averaging()
@@ -75,6 +76,7 @@ def test_an_own_learner_of_vectors_runs_in_processes_that_never_saw_it(tmp_path,
             assert np.array_equal(array, getattr(shared, field)), field
 
 
+@pytest.mark.slow
 def test_a_rule_over_an_own_rule_is_pickled_with_it():
     register_guide()
     over = {"name": "budget", "per_episode": 3, "of": GUIDE}

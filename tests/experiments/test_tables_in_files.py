@@ -88,6 +88,7 @@ def test_what_is_wrong_in_a_table_is_named(learner, message):
         make_experiment(settings(learners=[learner]))
 
 
+@pytest.mark.slow
 def test_a_power_law_of_forgetting_reaches_its_condition_and_is_read_back(tmp_path):
     learners = [{"forgetting": {"decay": 0.3}}, {"forgetting": {}}]
     plan = make_plan(make_experiment(settings(learners=learners, assistants=NONE)))

@@ -259,8 +259,10 @@ def test_a_reward_that_is_no_number_is_named_with_its_episode_and_step(step):
 
 
 def test_values_must_suit_the_task():
-    with pytest.raises(RequestError, match="cannot be solved exactly"):
+    with pytest.raises(RequestError, match="no expert ships for task 'corridor'"):
         in_the_corridor(values=None)
+    with pytest.raises(RequestError, match="corridor are vectors: give a network's values"):
+        in_the_corridor(values=lambda observation: np.zeros(2))
     wide = dataclasses.replace(guide(), inputs=2, parameters=np.zeros(6))
     with pytest.raises(
         RequestError, match="of 2 inputs and 2 actions; task corridor needs a network of 3"

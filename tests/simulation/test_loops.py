@@ -130,7 +130,9 @@ LONGER = {
     "random world, actor-critic, by a power law",
     "random world, sarsa, common",
     "random world, expected sarsa",
+    "random world, model, by a power law",
     "random world, slip",
+    "cliff, sarsa, slip and lag, forgetting",
     "cliff, taken back, sarsa, sometimes",
 }
 

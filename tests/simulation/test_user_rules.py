@@ -88,9 +88,8 @@ def register_with_memory(decide):
     return "budget", {"budget": 10_000}
 
 
-@pytest.mark.parametrize(
-    "register", [pytest.param(register_plain, marks=pytest.mark.slow), register_with_memory]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("register", [register_plain, register_with_memory])
 def test_an_own_rule_reaches_the_processes_that_step_a_task_in_python(register):
     """On numbers that the assistants share, maximal assistance written again does the same."""
     own = in_the_corridor(*register(elsewhere(guide_with_a_dictionary)), common_random_numbers=True)

@@ -13,22 +13,20 @@ from websockets.typing import Origin
 
 from tests.narrowing import present
 
-ADDRESS = re.compile(r"http://(127\.0\.0\.1:\d+)/")
+ADDRESS = re.compile(r"https?://([\w.]+:\d+)/")
 
 
 @contextlib.contextmanager
-def served(setup, choice, path, second=0.01):
-    """The address of a server in a thread."""
+def running(make):
+    """The address of a server in a thread; `make` is called with it."""
     import uvicorn
 
-    from qbumpers.study.running import configuration, listening_at
-    from qbumpers.study.server import Sessions, make_application
-    from qbumpers.study.tables import open_records
+    from qbumpers.study.addresses import listening_at
+    from qbumpers.study.running import configuration
 
     with contextlib.closing(listening_at(0)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
-        sessions = Sessions(setup, choice, open_records(path), second)
-        server = uvicorn.Server(configuration(make_application(sessions, [address])))
+        server = uvicorn.Server(configuration(make(address)))
         thread = threading.Thread(target=server.run, args=[[listening]])
         thread.start()
         try:
@@ -39,23 +37,50 @@ def served(setup, choice, path, second=0.01):
             assert not thread.is_alive()
 
 
+def served(setup, choice, path, second=0.01, also=()):
+    """The address of a server that is played on; pages may address it by others `also`."""
+    from qbumpers.study.server import Sessions, make_application
+    from qbumpers.study.tables import open_records
+
+    return running(
+        lambda address: make_application(
+            Sessions(setup, choice, open_records(path), second), [address, *also]
+        )
+    )
+
+
+def replayed(path):
+    """The address, with a path, of a server that shows what is recorded."""
+    from qbumpers.study.replaying import replay_file
+    from qbumpers.study.showing import Showing, make_showing
+    from qbumpers.study.tables import open_records
+
+    showing = Showing(open_records(path, new=False), list(replay_file(path)))
+    return running(lambda address: make_showing(showing, [address], "secret"))
+
+
 class Process:
     """`qbumpers play` in a process of its own, at a port that stays when it is started again."""
 
-    def __init__(self, *arguments, port=0):
-        self._arguments, self._port = arguments, port
+    def __init__(self, *arguments, port=0, errors=None):
+        self._arguments, self._port, self._errors = arguments, port, errors
         self.start()
+
+    @property
+    def pid(self):
+        return self._process.pid
 
     def start(self):
         self._process = subprocess.Popen(
             [sys.executable, "-m", "qbumpers", "play", *self._arguments, "--no-browser", "--port",
              str(self._port)],
-            stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            stdout=subprocess.PIPE, stderr=self._errors, text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
         found = ADDRESS.search(present(self._process.stdout).readline())
         assert found, "it does not say where it serves"
-        self.address = found[1]
-        self._port = int(self.address.rpartition(":")[2])
+        self.url, self.address = found[0], found[1]
+        self._port = self._port or int(self.address.rpartition(":")[2])
 
     def kill(self):
         """SIGKILL: nothing can be written any more."""
@@ -75,12 +100,12 @@ class Process:
 
 
 @contextlib.contextmanager
-def process(*arguments):
-    running = Process(*arguments)
+def process(*arguments, port=0, errors=None):
+    playing = Process(*arguments, port=port, errors=errors)
     try:
-        yield running
+        yield playing
     finally:
-        running.kill()
+        playing.kill()
 
 
 class Page:
@@ -101,7 +126,7 @@ class Page:
     def send(self, **message):
         self.socket.send(json.dumps(message))
 
-    def next(self, kind=None, timeout=10):
+    def next(self, kind=None, timeout=10.0):
         """The next message, or the next of a kind."""
         while True:
             message = json.loads(self.socket.recv(timeout=timeout))

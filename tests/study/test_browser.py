@@ -1,90 +1,22 @@
 """The page in a real browser: keys, touch, gamepad, reloads, a killed server, accessibility."""
 
-import contextlib
-import queue
-import shutil
-import socket
-import threading
 import time
-from pathlib import Path
 
 import pytest
 
 from qbumpers.study.game import Choice
 from qbumpers.study.tables import open_records, read_session, sessions_in
 from tests.narrowing import present
+from tests.study.browsing import AXE, WIDTHS, violations
 from tests.study.serving import process, served
 
 pytestmark = pytest.mark.study
 
-ROOT = Path(__file__).parents[2]
-AXE = ROOT / ".browser" / "node_modules" / "axe-core" / "axe.min.js"
-FLAGS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-]  # fmt: skip
-WIDTHS = {"desktop": 1280, "phone": 390}
 KEYS = ["ArrowUp", *["KeyD"] * 11, "ArrowDown"]
 """Around the cliff."""
 MINUS_13 = "\N{MINUS SIGN}13"
 SINCE = "step => Number(document.getElementById('step').textContent) >= step"
 ALONE = Choice("stochastic-q-bumpers", {"alpha": 0.5}, assisted=False)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    found = shutil.which("chromium")
-    if found is None:
-        pytest.skip("chromium is not installed: .ci/install_browser")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def opened(pages):
-    """Opens a page in a browser of its own."""
-    return pages[0]
-
-
-@pytest.fixture
-def open_in(pages):
-    """Opens one more page in the browser of another."""
-    return pages[1]
-
-
-@pytest.fixture
-def pages(browser):
-    """Opens pages; whatever goes wrong in one is an error of the test."""
-    wrong, contexts = [], []
-
-    def open_page(address, device="desktop", scheme="light", before="", **options):
-        height = 860 if device == "desktop" else 844
-        context = browser.new_context(
-            viewport={"width": WIDTHS[device], "height": height}, color_scheme=scheme,
-            has_touch=device == "phone", **options,
-        )  # fmt: skip
-        contexts.append(context)
-        if before:
-            context.add_init_script(before)
-        return open_in(context, address)
-
-    def open_in(context, address):
-        page = context.new_page()
-        page.set_default_timeout(15_000)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
-        page.goto(f"http://{address}/")
-        page.wait_for_selector("#task:not(:empty)")
-        return page
-
-    yield open_page, open_in
-    for context in contexts:
-        context.close()
-    # A server that is gone is what some tests are about.
-    assert [text for text in wrong if "ERR_CONNECTION" not in text] == []
 
 
 @pytest.fixture
@@ -304,6 +236,27 @@ def test_a_gamepad_plays(cliff_server, records, opened):
     assert [(row["device"], row["proposed"]) for row in rows] == [("gamepad", 0), ("gamepad", 1)]
 
 
+def test_a_gamepad_flies_the_lander(lander_server, records, opened):
+    page = opened(lander_server, before=GAMEPAD)
+    page.click("#go")
+    page.wait_for_selector("#overlay", state="hidden")
+    page.evaluate("window.pressed = [12]")
+    page.wait_for_function(SINCE, arg=20)
+    page.evaluate("window.pressed = []")
+    page.wait_for_selector("#pad .pressed", state="detached")
+    page.click("#pause")
+    page.wait_for_selector("#go:visible")
+    rows = [row for row in rows_of(records) if row["device"] == "gamepad"]
+    assert len(rows) > 5
+    assert {row["proposed"] for row in rows} <= {0, 2}
+    assert 2 in {row["proposed"] for row in rows}
+
+
+def test_the_keys_are_said_before_the_first_episode(lander_server, opened):
+    page = opened(lander_server)
+    assert "Keys: ← left, ↑ main, → right, ↓ nothing." in page.inner_text("#detail")
+
+
 def test_a_reload_goes_on_in_mid_episode(cliff_server, opened):
     page = opened(cliff_server)
     begin(page)
@@ -347,82 +300,6 @@ def test_a_second_tab_takes_over_and_the_first_says_so(cliff_server, opened, ope
     first.bring_to_front()
     first.click("#go")
     expect_step(first, 4)
-
-
-@contextlib.contextmanager
-def delayed(address, seconds):
-    """Another address of a server, so far away that each way takes some time."""
-    host, port = address.split(":")
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-
-        def carry(source, sink):
-            waiting = queue.SimpleQueue()
-            threading.Thread(target=deliver, args=[waiting, sink], daemon=True).start()
-            with contextlib.suppress(OSError):
-                while data := source.recv(65536):
-                    waiting.put((time.monotonic() + seconds, data))
-            waiting.put((0.0, b""))
-
-        def deliver(waiting, sink):
-            with contextlib.suppress(OSError), sink:
-                while True:
-                    due, data = waiting.get()
-                    if not data:
-                        break
-                    time.sleep(max(0.0, due - time.monotonic()))
-                    sink.sendall(data)
-
-        def accept():
-            with contextlib.suppress(OSError):
-                while True:
-                    near = listening.accept()[0]
-                    far = socket.create_connection((host, int(port)))
-                    for ends in ((near, far), (far, near)):
-                        threading.Thread(target=carry, args=ends, daemon=True).start()
-
-        threading.Thread(target=accept, daemon=True).start()
-        yield f"127.0.0.1:{listening.getsockname()[1]}"
-
-
-@pytest.mark.parametrize("round_trip", [0.1, 0.2])
-def test_presses_ahead_of_a_slow_connection_are_not_lost(cliff, records, opened, round_trip):
-    from qbumpers.study import running, server, tables
-
-    listening = running.listening_at(0)
-    near = f"127.0.0.1:{listening.getsockname()[1]}"
-    with contextlib.closing(listening), delayed(near, round_trip / 2) as far:
-        import uvicorn
-
-        sessions = server.Sessions(cliff, ALONE, tables.open_records(records))
-        serving = uvicorn.Server(
-            running.configuration(server.make_application(sessions, [near, far]))
-        )
-        thread = threading.Thread(target=serving.run, args=[[listening]])
-        thread.start()
-        try:
-            page = opened(far)
-            begin(page)
-            for key in KEYS[:3]:  # faster than answers come
-                page.keyboard.press(key)
-            expect_step(page, 3)
-            began = time.monotonic()
-            walk(page, KEYS[3:])
-            assert time.monotonic() - began < 10 * (round_trip + 0.4)
-            page.wait_for_selector("#go:visible")
-            assert page.inner_text("#return") == "87"
-            page.context.close()
-        finally:
-            serving.should_exit = True
-            thread.join(10)
-
-
-def violations(page):
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-    tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
-    found = page.evaluate("tags => axe.run({runOnly: tags})", tags)
-    return [
-        (each["id"], [node["target"] for node in each["nodes"]]) for each in found["violations"]
-    ]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -1,9 +1,11 @@
 """Records: whole or not there, never changed, read back to the bit."""
 
+import os
 import shutil
 import sqlite3
 import stat
 import threading
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -143,6 +145,48 @@ def test_what_waits_is_written_before_the_end(store):
     writer.close()
     assert all(future.done() for future in found)
     assert column(store, "select count(*) from notes") == [20]
+
+
+def test_what_lasts_is_flushed_first_and_nothing_else_waits_for_it(tmp_path, monkeypatch):
+    synchronise, flushed, asked = os.fsync, threading.Event(), []
+
+    def fsync(descriptor):
+        asked.append(os.path.basename(os.readlink(f"/proc/self/fd/{descriptor}")))
+        assert flushed.wait(10)
+        synchronise(descriptor)
+
+    writer = Writer(open_records(tmp_path / "play.sqlite"))
+    monkeypatch.setattr("qbumpers.study.flushing.os.fsync", fsync)
+    lasting = writer.add([note()], lasting=True)
+    writer.add([note()]).result(10)
+    assert not lasting.done()
+    flushed.set()
+    lasting.result(10)
+    assert asked == ["play.sqlite-wal"]
+    writer.close()
+
+
+def test_a_disk_that_does_not_flush_is_said(tmp_path, monkeypatch):
+    def fsync(_):
+        raise OSError(5, "Input/output error")
+
+    writer = Writer(open_records(tmp_path / "play.sqlite"))
+    monkeypatch.setattr("qbumpers.study.flushing.os.fsync", fsync)
+    with pytest.raises(OSError, match="Input/output error"):
+        writer.add([note()], lasting=True).result(10)
+    writer.add([note()]).result(10)
+    writer.close()
+
+
+def test_the_log_is_put_into_the_file_while_it_is_written(tmp_path):
+    path = tmp_path / "play.sqlite"
+    writer = Writer(open_records(path))
+    (table, row) = note()
+    large = (table, {**row, "content": "x" * 100_000})
+    for _ in range(60):
+        writer.add([large], lasting=True).result(10)
+    assert path.stat().st_size > 3_000_000
+    writer.close()
 
 
 def test_only_who_took_a_session_last_adds_to_it(writing):
@@ -311,7 +355,11 @@ def test_records_of_a_newer_version_or_of_something_else_are_refused(tmp_path, s
     ("records", "message"),
     [
         ("mysql://root@localhost/x", "records of mysql://: a file, or postgresql://USER@HOST/DATA"),
-        ("postgresql://a:secret@127.0.0.1:1/x", r"a:\*\*\*@127\.0\.0\.1:1/x: .*[Cc]onnection"),
+        pytest.param(
+            "postgresql://a:secret@127.0.0.1:1/x",
+            r"a:\*\*\*@127\.0\.0\.1:1/x: .*[Cc]onnection",
+            marks=pytest.mark.skipif(not find_spec("psycopg"), reason="psycopg is missing"),
+        ),
         ("postgresql://a:secret@127.0.0.1:port/x", "not a URL"),
         ("absent.sqlite", "records file absent.sqlite: there is none"),
     ],

@@ -22,6 +22,7 @@ from qbumpers.study.setup import Setup
 from qbumpers.study.tables import open_records, read_session, sessions_in
 from tests.narrowing import present
 from tests.study.serving import AROUND, LEFT, RIGHT, UP, Page, process, served
+from tests.values.networks import network_of
 
 BUMPERS = Choice("stochastic-q-bumpers", {"alpha": 0.5})
 
@@ -102,6 +103,10 @@ def test_late_and_repeated_messages_change_nothing(address):
             json.dumps({"type": "begin", "episode": 0, "assistant": "stochastic-q-bumpers",
                         "options": {"alpha": 1, "v_min": 500}}),
             "v_min = 500 must be below the value of the start state",
+        ),
+        (
+            '{"type": "begin", "episode": 0, "assistant": "undo", "options": {"name": "maximal"}}',
+            "unknown option",
         ),
         ('{"type": "hold", "sequence": 1, "action": 44}', "action = 44; it must lie in [0, 4)"),
     ],
@@ -253,7 +258,7 @@ def test_a_task_in_real_time_goes_by_its_clock(lander, records):
     [session] = recorded(records)
     actions = [int(step.proposed) for step in session.played[0].steps]
     assert set(actions) == {0, 2}
-    assert replay_file(records)[0].difference == ""
+    assert next(replay_file(records)).difference == ""
 
 
 def test_the_clock_stops_while_the_page_is_away(records):
@@ -284,6 +289,25 @@ def test_half_speed_is_half_as_fast(lander, records):
         for _ in range(15):
             page.next("state")
         assert 15 / 25 * 0.9 < time.monotonic() - began < 3
+
+
+def test_without_a_key_the_actions_of_cart_pole_take_turns(tmp_path, records):
+    network_of(inputs=4, actions=2, task="CartPole-v1").save(tmp_path / "pole.npz")
+    pole = Setup("CartPole-v1", tmp_path / "pole.npz", discount=0.9)
+    with served(pole, Choice("none", {}), records) as address, Page(address) as page:
+        page.begin()
+        page.next("running")
+        began = time.monotonic()
+        while page.next("state")["number"] < 6:
+            pass
+        assert time.monotonic() - began > 4 / 25  # half of its own 50 Hz
+        page.send(type="hold", sequence=1, action=1)
+        while page.next("state")["number"] < 12:
+            pass
+    [session] = recorded(records)
+    actions = [int(step.proposed) for step in session.played[0].steps]
+    assert actions[:6] == [0, 1, 0, 1, 0, 1]
+    assert actions[9:12] == [1, 1, 1]
 
 
 class NoOptions(NamedTuple):

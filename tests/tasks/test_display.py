@@ -72,8 +72,9 @@ def test_every_action_has_a_name_of_its_own_and_a_key(name):
 @pytest.mark.parametrize("name", ALL)
 def test_real_time_displays_have_an_idle_action_and_others_none(name):
     display, _ = shown(name)
-    assert (display.rate > 0) == (display.idle in range(len(display.actions)))
-    assert display.rate in {0, 30, 50}
+    alone = display.idle in range(len(display.actions))  # an action leaves the task alone
+    assert alone == (display.rate > 0 and name != "CartPole-v1")
+    assert display.rate in {0, 25, 30, 50}
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)

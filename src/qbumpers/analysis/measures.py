@@ -153,11 +153,10 @@ def trial_samples(trials: pl.DataFrame, *measures: str) -> dict[str, np.ndarray]
         float64 [T, M] by condition, in the order of the experiment, trials by number; NaN if a
         measure is unknown.
     """
-    parts = trials.partition_by("condition", as_dict=True, maintain_order=True)
-    return {
-        str(key[0]): part.sort("trial").select(pl.col(measures).cast(pl.Float64)).to_numpy()
-        for key, part in parts.items()
-    }
+    found = trials.group_by("condition", maintain_order=True).agg(
+        pl.col(measures).cast(pl.Float64).sort_by("trial")
+    )
+    return {name: np.array(values, np.float64).T for name, *values in found.iter_rows()}
 
 
 def summary(
@@ -182,16 +181,15 @@ def summary(
     counts = {"episodes": episodes, **({"retention_episodes": retention} if retention else {})}
     names = list(dict.fromkeys(name for chosen in options.values() for name in chosen))
     leading = [name for name in ("alpha", "second") if name in names]
+    samples = trial_samples(trials, *known)
     rows = []
-    for part in trials.partition_by("condition", maintain_order=True):
-        first = part.row(0, named=True)
+    for first in trials.unique("condition", keep="first", maintain_order=True).to_dicts():
         chosen = options.get(first["condition"], {})
         row: dict[str, Any] = {name: first[name] for name in ("condition", "assistant", "learner")}
         row |= {name: chosen.get(name) for name in (*leading, *sorted(set(names) - set(leading)))}
-        row |= {"trials": part.height, **counts}
-        for measure in known:
-            values = part[measure].cast(pl.Float64).drop_nulls().to_numpy()
-            row |= _columns(measure, values)
+        row |= {"trials": len(samples[first["condition"]]), **counts}
+        for measure, values in zip(known, samples[first["condition"]].T, strict=True):
+            row |= _columns(measure, values[~np.isnan(values)])
         rows.append(row)
     return pl.DataFrame(rows, infer_schema_length=None)
 

@@ -8,7 +8,16 @@ import typer
 from rich.markup import escape
 
 from qbumpers.cli.console import OUTPUT
-from qbumpers.cli.study import check_installed, study
+from qbumpers.cli.study import (
+    BehindProxy,
+    Browser,
+    Certificate,
+    Host,
+    Key,
+    Port,
+    check_installed,
+    study,
+)
 from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
@@ -95,12 +104,16 @@ def _folder(out: Path | None, design: "Study") -> Path:
 
 
 @study.command("serve")
-def serve_study(
+def serve_it(
     file: File,
     live: Live = False,
     out: Folder = None,
-    port: Annotated[int, typer.Option(help="Of this machine; 0 for any.", metavar="N")] = 8765,
-    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    host: Host = "127.0.0.1",
+    port: Port = 8765,
+    certificate: Certificate = None,
+    key: Key = None,
+    behind_proxy: BehindProxy = None,
+    browser: Browser = True,
 ) -> None:
     """Serve a study: a pilot, or live as it was frozen. Ctrl-C ends it.
 
@@ -108,22 +121,25 @@ def serve_study(
     """
     check_installed()
     from qbumpers.studies.design.sources import check_playable, load_study
-    from qbumpers.studies.flow.running import opened, records_of, serve
+    from qbumpers.studies.flow.running import opened, records_of, serve_study
     from qbumpers.studies.flow.server import StudyHost
+    from qbumpers.study.addresses import Address
 
+    address = Address(host, port, certificate, key, behind_proxy or "")
+    address.check()
     design = load_study(file)
     setups = check_playable(design)
     _warn_of_identities(file, design)
     mode, folder = "live" if live else "pilot", _folder(out, design)
-    host = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
+    served = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
 
-    def announce(url: str, researcher: str) -> None:
+    def announce(url: str) -> None:
         _say(f"The study is at {url}; the records go into {records_of(folder, mode)}")
-        _say(f"The researcher's page is at {researcher}; its token is {host.token}")
+        _say(f"The researcher's page is at {url}researcher; its token is {served.token}")
         _say("Ctrl-C ends it.")
 
     try:
-        serve(host, setups, port=port, browser=browser, announce=announce)
+        serve_study(served, setups, address, browser=browser, announce=announce)
     except KeyboardInterrupt:
         OUTPUT.print("\nStopped; what happened is kept.")
 

@@ -1,5 +1,6 @@
 """`qbumpers play` and `qbumpers study`."""
 
+import contextlib
 import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from qbumpers.imports import import_modules
 
 if TYPE_CHECKING:
     from qbumpers.experiments.participants import Exported
+    from qbumpers.study.replaying import Replayed
 
 study = typer.Typer(
     help="Studies with participants, and what was played in the browser.", no_args_is_help=True
@@ -31,6 +33,23 @@ Records = Annotated[
         help="What play recorded: a file, or the URL of a PostgreSQL database.", metavar="RECORDS"
     ),
 ]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
+        metavar="ADDRESS",
+    ),
+]
+Certificate = Annotated[Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")]
+Key = Annotated[Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")]
+BehindProxy = Annotated[
+    str | None,
+    typer.Option(
+        help="Where a proxy serves it: https://study.example.org",
+        metavar="URL",
+        show_default=False,
+    ),
+]
 Alpha = Annotated[
     float | None,
     typer.Option(help="How much the assistant leaves to you.", metavar="SHARE"),
@@ -43,6 +62,8 @@ Values = Annotated[
         metavar="FILE",
     ),
 ]
+Port = Annotated[int, typer.Option(help="0 for any that is free.", metavar="N")]
+Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
 Discount = Annotated[
     float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
 ]
@@ -65,8 +86,12 @@ def play(
     alpha: Alpha = None,
     values: Values = None,
     discount: Discount = None,
-    port: Annotated[int, typer.Option(help="Of this machine; 0 for any.", metavar="N")] = 8765,
-    browser: Annotated[bool, typer.Option(help="Open the page in the browser.")] = True,
+    host: Host = "127.0.0.1",
+    port: Port = 8765,
+    certificate: Certificate = None,
+    key: Key = None,
+    behind_proxy: BehindProxy = None,
+    browser: Browser = True,
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
     ] = Path("results/play"),
@@ -88,6 +113,7 @@ def play(
     """
     check_installed()
     import_modules(imports or (), "--import")
+    from qbumpers.study.addresses import Address
     from qbumpers.study.game import Choice
     from qbumpers.study.running import play as serve
     from qbumpers.study.setup import Setup
@@ -100,6 +126,8 @@ def play(
         choice = Choice(*_DEFAULT)
     else:
         choice = Choice(assistant or _DEFAULT[0], options)
+    address = Address(host, port, certificate, key, behind_proxy or "")
+    address.check()  # before anything is solved
     setup = Setup(task, values, discount=discount)
     place = _database_at(records) if records is not None else out / _RECORDS
 
@@ -108,10 +136,9 @@ def play(
         where = escape(place_of(place))
         OUTPUT.print(f"The record goes into {where}; Ctrl-C ends it.", soft_wrap=True)
 
-    try:
-        serve(setup, choice, place, port=port, browser=browser, announce=announce)
-    except KeyboardInterrupt:
-        OUTPUT.print("\nStopped; what was played is kept.")
+    with contextlib.suppress(KeyboardInterrupt):
+        serve(setup, choice, place, address=address, browser=browser, announce=announce)
+    OUTPUT.print("\nStopped; what was played is kept.")
 
 
 def _database_at(records: str) -> str:
@@ -149,25 +176,48 @@ def _value_of(text: str) -> Any:
 @study.command("replay")
 def replay_records(
     records: Records,
+    session: Annotated[
+        list[str] | None,
+        typer.Option(help="Only this one; may be repeated.", metavar="ID", show_default="all"),
+    ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Say it here, and show no page.")] = False,
+    port: Port = 8766,
+    browser: Browser = True,
     imports: Imports = None,
 ) -> None:
-    """Decide recorded sessions again, and say whether anything comes out differently.
+    """Decide recorded sessions again, say whether anything comes out differently, and show them.
+
+    Exit status 1 if anything does. Ctrl-C ends the page.
 
     Example: qbumpers study replay results/play/play.sqlite
     """
     check_installed()
     import_modules(imports or (), "--import")
     from qbumpers.study.replaying import replay_file
+    from qbumpers.study.running import show
+    from qbumpers.study.showing import Showing
+    from qbumpers.study.stores import shown
+    from qbumpers.study.tables import open_records
 
-    different = 0
-    for found in replay_file(records):
+    replayed: list[Replayed] = []
+    for found in replay_file(records, session or ()):
         sizes = f"{counted(found.episodes, 'episode')}, {counted(found.steps, 'step')}"
         verdict = f"different: {found.difference}" if found.difference else "OK"
         line = f"{found.session} {found.task}: {sizes}: {verdict}"
         OUTPUT.print(escape(line), soft_wrap=True)
-        different += bool(found.difference)
-    if different:
+        replayed.append(found)
+    if not check:
+        if not replayed:
+            raise RequestError(f"{shown(records)}: it has no session to be shown")
+        showing = Showing(open_records(records, new=False), replayed)
+        with contextlib.suppress(KeyboardInterrupt):
+            show(showing, port=port, browser=browser, announce=_announce_replay)
+    if any(found.difference for found in replayed):
         raise typer.Exit(1)
+
+
+def _announce_replay(url: str) -> None:
+    OUTPUT.print(f"Watch at [bold]{url}[/bold] ; Ctrl-C ends it.", soft_wrap=True)
 
 
 @study.command("export")

@@ -28,9 +28,9 @@ from qbumpers.study.stores import shown
 from qbumpers.study.tables import (
     Recorded,
     open_records,
+    read_moments,
     read_notes,
     read_session,
-    read_times,
     sessions_in,
 )
 
@@ -198,7 +198,9 @@ def _write_tables(
 ) -> None:
     """What everybody did."""
     steps = {one.session: _table(one) for one in group if one.steps}
-    own = pl.concat(pl.DataFrame(read_times(engine, name)) for name in steps)
+    own = pl.concat(
+        pl.DataFrame(moment._asdict() for moment in read_moments(engine, name)) for name in steps
+    )
     about = pl.DataFrame([
         {PARTICIPANT: e.session, "episode": e.episode.number, "condition": e.condition,
          "assisted": e.episode.choice.assisted}

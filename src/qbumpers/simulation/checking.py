@@ -21,6 +21,7 @@ from qbumpers.values import NetworkValues, QValues, check_width, solve
 from qbumpers.values.exact import SOLVED_ROWS, solved_rows
 from qbumpers.values.fitting import use_at
 from qbumpers.values.others import all_further_values, further_values, numbered
+from qbumpers.values.shipped import shipped_values
 from qbumpers.values.tabular import as_values
 
 
@@ -32,8 +33,9 @@ def checked_values(
     Args:
         task: what is to be learned.
         assistant: whose values they are.
-        values: as `as_values` takes them; None for the exact solution of a task with a table. Rows
-            of `SOLVED_ROWS` that values of such a task lack are solved, too.
+        values: as `as_values` takes them; None for the exact solution of a task with a table, and
+            for the expert that ships for one without. Rows of `SOLVED_ROWS` that values of a task
+            with a table lack are solved, too.
 
     Raises:
         RequestError: if they do not fit the task, or an episode could start in a state that does
@@ -82,11 +84,10 @@ def _table(task: Task, source: Any, name: str) -> np.ndarray:
 def _checked_network(
     task: Task, assistant: Assistant, values: QValues | np.ndarray | None
 ) -> tuple[Any, Any, float, tuple[str, ...]]:
-    if values is not None:
-        values = as_values(values, use_at(task))
+    values = shipped_values(task) if values is None else as_values(values, use_at(task))
     if not isinstance(values, NetworkValues):
         raise RequestError(
-            f"values = {in_short(values)}; task {task.name} cannot be solved exactly: give a "
+            f"values = {in_short(values)}; the states of task {task.name} are vectors: give a "
             "network's values, for instance of load_values or train_expert"
         )
     # They have the shape of Q*, or there would be no such values.

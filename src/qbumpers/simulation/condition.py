@@ -41,8 +41,9 @@ class Setup(TypedDict, total=False):
     """What `simulate` and `make_condition` take by name, beside task and assistant.
 
     Attributes:
-        values: Q* of the assistant, as an array [S, A] or a function; the exact solution of a task
-            with a table if left out. Values that state no discount are taken to have the task's.
+        values: Q* of the assistant, as an array [S, A] or a function; if left out, the exact
+            solution of a task with a table, else those of the expert that ships for the task.
+            Values that state no discount are taken to have the task's.
         learner: settings of a registered learner, for instance `QLearner()`; the paper's, with the
             task's discount, if left out.
         perception: what the learner believes happened when it was overridden, a `Perception` or the

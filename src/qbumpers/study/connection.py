@@ -81,8 +81,9 @@ class Connection:
             return
         try:
             await self.send("closing", code=code, reason=reason)
-            await self._socket.close(code)
-        except (GoneError, RuntimeError):
+            async with asyncio.timeout(_PATIENCE):
+                await self._socket.close(code)
+        except (GoneError, RuntimeError, TimeoutError):
             return
 
     def _count(self) -> None:

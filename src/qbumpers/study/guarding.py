@@ -42,10 +42,12 @@ class Guard:
     Args:
         application: to be guarded.
         hosts: names with ports by which it may be addressed.
+        scheme: "http" or "https", of the pages.
     """
 
-    def __init__(self, application: ASGIApp, hosts: Collection[str]) -> None:
+    def __init__(self, application: ASGIApp, hosts: Collection[str], scheme: str = "http") -> None:
         self._application, self._hosts = application, frozenset(hosts)
+        self._scheme = scheme
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """See ASGI."""
@@ -55,7 +57,7 @@ class Guard:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
         if scope["type"] == "websocket":
-            if host in self._hosts and headers.get("origin") == f"http://{host}":
+            if host in self._hosts and headers.get("origin") == f"{self._scheme}://{host}":
                 await self._application(scope, receive, send)
             else:
                 await send({"type": "websocket.close", "code": 1008})  # answers 403

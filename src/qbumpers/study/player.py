@@ -258,9 +258,8 @@ class Player:
     async def _show(self) -> None:
         game = self._game
         turns = self._display.rate == 0
-        seen = turns or not game.episodes[-1].length % _VIEW_EVERY
-        surprising = game.last is not None and bool(game.last.overridden)
-        with_view = self._with_view and (seen or surprising or not game.playing)
+        due = turns or not game.episodes[-1].length % _VIEW_EVERY or not game.playing
+        with_view = self._with_view and due
         await self._send("state", **state_view(game, with_view=with_view))
 
     async def _send(self, kind: str, **fields: Any) -> None:
@@ -322,9 +321,12 @@ class Player:
 
     def _proposed_now(self) -> Proposal:
         held = self._held
+        idle = self._display.idle
+        if idle < 0:
+            idle = self._game.number % self._game.setup.task.actions
         if held is None:
-            return Proposal(self._display.idle, "none", None, None, None)
-        action = self._display.idle if held.action is None else held.action
+            return Proposal(idle, "none", None, None, None)
+        action = idle if held.action is None else held.action
         return Proposal(action, held.device, held.pressed, held.shown, self._held_since)
 
 

@@ -1,12 +1,15 @@
 """Deciding recorded sessions again."""
 
 import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import sqlalchemy as sql
+
 from qbumpers.assistants import make_assistant
 from qbumpers.decisions import Step
-from qbumpers.errors import RequestError
+from qbumpers.errors import RequestError, in_short
 from qbumpers.session import ReplayError, replay
 from qbumpers.study.game import Played
 from qbumpers.study.setup import Setup, setup_of
@@ -33,20 +36,47 @@ class Replayed(NamedTuple):
     difference: str
 
 
-def replay_file(records: str | Path) -> list[Replayed]:
-    """Hold rule and task to every session of records.
+def replay_file(records: str | Path, sessions: Sequence[str] = ()) -> Iterator[Replayed]:
+    """Hold rule and task to the sessions of records.
 
     Args:
         records: as `open_records` takes them.
+        sessions: identifiers of those that are meant; all if there are none.
+
+    Yields:
+        What became of each.
 
     Raises:
-        RequestError: as `open_records`.
+        RequestError: as `open_records`, or if there is no such session; before the first one.
     """
     engine = open_records(records, new=False)
-    found = (read_session(engine, session) for session in sessions_in(engine))
-    results = [replay_session(recorded) for recorded in found if recorded is not None]
+    chosen = chosen_sessions(engine, sessions)
+    return _replayed(engine, chosen)
+
+
+def chosen_sessions(engine: sql.Engine, sessions: Sequence[str]) -> list[str]:
+    """Those of the sessions of a record that are meant.
+
+    Args:
+        engine: of the records.
+        sessions: identifiers; all if there are none.
+
+    Raises:
+        RequestError: if there is no such session.
+    """
+    found = sessions_in(engine)
+    for session in sessions:
+        if session not in found:
+            raise RequestError(f"session = {session!r}: the record has {in_short(found)}")
+    return list(sessions) or found
+
+
+def _replayed(engine: sql.Engine, sessions: Sequence[str]) -> Iterator[Replayed]:
+    for session in sessions:
+        recorded = read_session(engine, session)
+        if recorded is not None:
+            yield replay_session(recorded)
     engine.dispose()
-    return results
 
 
 def replay_session(recorded: Recorded) -> Replayed:

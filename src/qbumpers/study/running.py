@@ -1,20 +1,29 @@
-"""Running the server on this machine."""
+"""Running the server."""
 
+import asyncio
 import contextlib
 import socket
+import sys
 import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 
-from qbumpers.errors import RequestError
+from qbumpers.study.addresses import Address, listening_at
 from qbumpers.study.game import Choice, Game
 from qbumpers.study.messages import MOST_BYTES
+from qbumpers.study.prompt import PromptHTTP, PromptLoop, PromptSocket, allow_connections, plain_log
 from qbumpers.study.server import Sessions, make_application
 from qbumpers.study.setup import Setup
+from qbumpers.study.showing import Showing, make_showing, new_secret
 from qbumpers.study.tables import open_records
+
+_SWITCHES = 0.001
+"""Seconds after which a thread that waits gets its turn: steps wait for the thread of the records
+and it for them, and Python's 5 ms would be a quarter of a step at 50 Hz."""
 
 
 def play(
@@ -22,72 +31,126 @@ def play(
     choice: Choice,
     records: str | Path,
     *,
-    port: int,
+    address: Address,
     browser: bool,
     announce: Callable[[str], None],
 ) -> None:
-    """Serve a task on this machine until Ctrl-C.
+    """Serve a task until Ctrl-C.
 
     Args:
         setup: what is played.
         choice: who assists unless the participant chooses.
         records: where they are, as `open_records` takes them.
-        port: of 127.0.0.1; any that is free if 0.
+        address: where to listen, see `Address.check`.
         browser: whether to open the page in a browser.
         announce: is called with the page's URL before anyone is served.
 
     Raises:
-        RequestError: if the assistant does not suit the task, the port is in use, or the records
-            cannot be written.
+        RequestError: if the address is refused or in use, the assistant does not suit the task, or
+            the records cannot be written.
     """
+    address.check()
     Game(setup, 0).begin(choice)
-    with contextlib.closing(listening_at(port)) as listening:
-        address = f"127.0.0.1:{listening.getsockname()[1]}"
-        url = f"http://{address}/"
+
+    def make(hosts: list[str]) -> Any:
         sessions = Sessions(setup, choice, open_records(records))
-        hosts = [address, address.replace("127.0.0.1", "localhost")]
+        return make_application(sessions, hosts, address.scheme)
+
+    serve(make, address, browser=browser, announce=announce)
+
+
+def show(showing: Showing, *, port: int, browser: bool, announce: Callable[[str], None]) -> None:
+    """Show recorded sessions on this machine until Ctrl-C.
+
+    Args:
+        showing: the sessions.
+        port: of this machine; any that is free if 0.
+        browser: whether to open the page in a browser.
+        announce: is called with the page's URL before it is served.
+
+    Raises:
+        RequestError: if the port is in use.
+    """
+    secret = new_secret()
+
+    def make(hosts: list[str]) -> Any:
+        return make_showing(showing, hosts, secret)
+
+    serve(make, Address(port=port), browser=browser, announce=announce, path=f"{secret}/")
+
+
+def serve(
+    make: Callable[[list[str]], Any],
+    address: Address,
+    *,
+    browser: bool,
+    announce: Callable[[str], None],
+    path: str = "",
+) -> None:
+    """Serve an application until Ctrl-C.
+
+    Args:
+        make: is called with the names by which pages may address it once it listens there.
+        address: where to listen, checked.
+        browser: whether to open the page in a browser.
+        announce: is called with the page's URL before anyone is served.
+        path: of the page.
+
+    Raises:
+        RequestError: if the address is in use, or what `make` raises.
+    """
+    with contextlib.closing(listening_at(address.port, address.host)) as listening:
+        hosts = address.hosts(listening.getsockname()[1])
+        application = make(hosts)
+        url = f"{address.scheme}://{hosts[0]}/{path}"
         announce(url)
         if browser:
             threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
-        uvicorn.Server(configuration(make_application(sessions, hosts))).run([listening])
+        serve_until_stopped(application, listening, address)
 
 
-def configuration(application: object) -> uvicorn.Config:
-    """How uvicorn serves an application: one process, small messages, no compression."""
-    return uvicorn.Config(
+def serve_until_stopped(
+    application: object, listening: socket.socket, address: Address | None = None
+) -> None:
+    """Serve an application in this process, which does nothing else.
+
+    Args:
+        application: an ASGI application.
+        listening: socket that listens already.
+        address: with its certificate, if it has one.
+    """
+    sys.setswitchinterval(_SWITCHES)
+    allow_connections()
+    server = uvicorn.Server(configuration(application, address))
+    with asyncio.Runner(loop_factory=PromptLoop) as runner:
+        runner.run(server.serve([listening]))
+
+
+def configuration(application: object, address: Address | None = None) -> uvicorn.Config:
+    """How uvicorn serves an application: one process, small messages, no compression.
+
+    Args:
+        application: to be served.
+        address: with its certificate, if it has one.
+    """
+    address = address or Address()
+    config = uvicorn.Config(
         application,  # pyright: ignore[reportArgumentType]
-        ws="websockets-sansio",
+        http=PromptHTTP,
+        ws=PromptSocket,
         ws_max_size=2 * MOST_BYTES,
         ws_ping_interval=5,
         ws_ping_timeout=10,
         ws_per_message_deflate=False,  # messages are small, and time is short
         timeout_keep_alive=5,
+        backlog=128,  # also how many are taken at once before others have their turn
         timeout_graceful_shutdown=2,
-        limit_concurrency=500,
+        proxy_headers=False,  # nothing hangs on what anyone can write into a header
         server_header=False,
         access_log=False,
         log_level="warning",
+        ssl_certfile=address.certificate,
+        ssl_keyfile=address.key,
     )
-
-
-def listening_at(port: int) -> socket.socket:
-    """A socket of 127.0.0.1 that listens already.
-
-    Args:
-        port: any that is free if 0.
-
-    Raises:
-        RequestError: if it is in use, or there is no such port.
-    """
-    listening = socket.socket()
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listening.bind(("127.0.0.1", port))
-    except (OSError, OverflowError) as error:
-        listening.close()
-        raise RequestError(
-            f"port = {port}: {getattr(error, 'strerror', None) or error}; give a free one by "
-            "--port, or 0 for any"
-        ) from error
-    listening.listen(128)
-    return listening
+    plain_log()
+    return config

@@ -5,9 +5,10 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import AsyncGenerator, Collection, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import AsyncGenerator, Collection, Generator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import sqlalchemy as sql
 from itsdangerous import BadSignature, URLSafeSerializer
@@ -54,7 +55,12 @@ STATIC = Path(__file__).with_name("static")
 MOST_CONNECTIONS = 200
 """Pages at once."""
 
-_GREETING = 5.0  # seconds within which a page must greet
+MOST_SILENT = 100
+"""Sockets at once that have not greeted; if one more comes, the one that waited longest goes."""
+
+GREETING = 5.0
+"""Seconds within which a page must greet."""
+
 _LOGGER = logging.getLogger("qbumpers.study")
 
 
@@ -62,7 +68,71 @@ class UnknownSessionError(RequestError):
     """A token of no session that can go on here."""
 
 
-class Sessions:
+class Entrance(ABC):
+    """Whose pages a server serves: those of play, or of a study. It counts its pages."""
+
+    def __init__(self) -> None:
+        self._open = 0
+        self._silent: list[asyncio.Timeout] = []
+
+    def connection(self, socket: WebSocket) -> Any:
+        """A page at the other end of a socket."""
+        return Connection(socket)
+
+    async def greeted(self, connection: Connection) -> Hello:
+        """What a page says first.
+
+        Raises:
+            RequestError: if it is no greeting.
+            TimeoutError: if it does not come soon, or others wait that came later.
+            GoneError: if the page has gone.
+        """
+        async with asyncio.timeout(GREETING) as limit:
+            self._silent.append(limit)
+            if len(self._silent) > MOST_SILENT:
+                self._silent.pop(0).reschedule(0.0)
+            try:
+                hello = await connection.receive()
+            finally:
+                with contextlib.suppress(ValueError):  # if it had to go, it is out already
+                    self._silent.remove(limit)
+        if not isinstance(hello, Hello):
+            raise RequestError("the first message of a page is hello")
+        return hello
+
+    @contextlib.contextmanager
+    def page(self) -> Generator[None, None, None]:
+        """One more page.
+
+        Raises:
+            TooMuchError: if there are too many.
+        """
+        if self._open >= MOST_CONNECTIONS:
+            raise TooMuchError("too many pages are open")
+        self._open += 1
+        try:
+            yield
+        finally:
+            self._open -= 1
+
+    @abstractmethod
+    async def join(self, connection: Any, hello: Any, /) -> Any:
+        """Whose page it is that has greeted; something that handles messages."""
+
+    @abstractmethod
+    async def welcome(self, player: Any, connection: Any, hello: Any, /) -> None:
+        """Show a page where they are."""
+
+    @abstractmethod
+    async def leave(self, player: Any, connection: Any, /) -> None:
+        """A page has gone."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Write what is waiting."""
+
+
+class Sessions(Entrance):
     """The sessions that are being played, and those of the record.
 
     Args:
@@ -75,13 +145,12 @@ class Sessions:
     def __init__(
         self, setup: Setup, choice: Choice, engine: sql.Engine, second: float = 1.0
     ) -> None:
+        super().__init__()
         self._setup, self._engine, self._second = setup, engine, second
         self._writer = Writer(engine)
         self._signer = URLSafeSerializer(secret_of(engine), salt="session")
         self._players: dict[str, Player] = {}
         self._finding = asyncio.Lock()
-        self.open = 0
-        self.connection = Connection
         self._facts: dict[str, Any] = {
             "task": task_view(setup),
             "offers": offers(setup),
@@ -172,57 +241,16 @@ class Sessions:
         return player
 
 
-class Entrance(Protocol):
-    """Whose pages a server serves: those of play, or of a study.
-
-    Attributes:
-        open: how many pages there are.
-    """
-
-    open: int
-
-    def connection(self, socket: WebSocket) -> Any:
-        """A page at the other end of a socket."""
-        ...
-
-    async def join(self, connection: Any, hello: Any, /) -> Any:
-        """Whose page it is that has greeted; something that handles messages."""
-        ...
-
-    async def welcome(self, player: Any, connection: Any, hello: Any, /) -> None:
-        """Show a page where they are."""
-        ...
-
-    async def leave(self, player: Any, connection: Any, /) -> None:
-        """A page has gone."""
-        ...
-
-    def close(self) -> None:
-        """Write what is waiting."""
-        ...
-
-
 async def _converse(sessions: Entrance, connection: Connection) -> None:
     """Everything that a page says, until it goes."""
-    player: Any = None
     try:
-        async with asyncio.timeout(_GREETING):
-            hello = await connection.receive()
-        if not isinstance(hello, Hello):
-            raise RequestError("the first message of a page is hello")
-        player = await sessions.join(connection, hello)
-        await sessions.welcome(player, connection, hello)
-        while True:
-            try:
-                await player.handle(await connection.receive())
-            except TooMuchError:
-                raise
-            except RequestError as error:
-                await connection.send("problem", message=str(error))
+        hello = await sessions.greeted(connection)
+        with sessions.page():
+            await _play(sessions, connection, hello)
     except GoneError:
         pass
     except TimeoutError:
-        await connection.close(WRONG, f"no hello within {_GREETING:.0f} seconds")
+        await connection.close(WRONG, f"no hello within {GREETING:.0f} seconds")
     except UnknownSessionError as error:
         await connection.close(UNKNOWN_SESSION, str(error))
     except TooMuchError as error:
@@ -234,9 +262,22 @@ async def _converse(sessions: Entrance, connection: Connection) -> None:
     except Exception:
         _LOGGER.exception("a session failed")
         await connection.close(1011, "the server failed; what happened before is kept")
+
+
+async def _play(sessions: Entrance, connection: Connection, hello: Hello) -> None:
+    """What a page says once it has greeted."""
+    player = await sessions.join(connection, hello)
+    try:
+        await sessions.welcome(player, connection, hello)
+        while True:
+            try:
+                await player.handle(await connection.receive())
+            except TooMuchError:
+                raise
+            except RequestError as error:
+                await connection.send("problem", message=str(error))
     finally:
-        if player is not None:
-            await sessions.leave(player, connection)
+        await sessions.leave(player, connection)
 
 
 def make_application(
@@ -244,6 +285,7 @@ def make_application(
     hosts: Collection[str],
     file: str = "index.html",
     routes: Sequence[BaseRoute] = (),
+    scheme: str = "http",
 ) -> Any:
     """The server as an ASGI application.
 
@@ -252,6 +294,7 @@ def make_application(
         hosts: names with ports by which pages may address it.
         file: name of its page in `STATIC`.
         routes: further ones.
+        scheme: "http" or "https", of the pages.
     """
 
     async def page(_: Request) -> FileResponse:
@@ -259,15 +302,7 @@ def make_application(
 
     async def socket(websocket: WebSocket) -> None:
         await websocket.accept()
-        connection = sessions.connection(websocket)
-        if sessions.open >= MOST_CONNECTIONS:
-            await connection.close(TOO_MUCH, "too many pages are open")
-            return
-        sessions.open += 1
-        try:
-            await _converse(sessions, connection)
-        finally:
-            sessions.open -= 1
+        await _converse(sessions, sessions.connection(websocket))
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
@@ -279,4 +314,5 @@ def make_application(
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=[*everywhere, *routes], lifespan=lifespan), hosts)
+    application = Starlette(routes=[*everywhere, *routes], lifespan=lifespan)
+    return Guard(application, hosts, scheme)

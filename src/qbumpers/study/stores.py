@@ -1,7 +1,8 @@
 """Where records are: in a SQLite file, or in a PostgreSQL database by its URL."""
 
 import contextlib
-from collections.abc import Generator
+import functools
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from qbumpers.errors import RequestError
 
 _SCHEMES = ("postgresql://", "postgres://")
 _CONNECTING = 5  # seconds until a database that does not answer counts as absent
+_MOST_PAGES = 16_000  # of the log until a commit waits for them: a flusher comes before
 _READS = "reads"  # execution option of SQLite connections that write nothing
 
 
@@ -94,7 +96,12 @@ def is_postgresql(bind: sql.Engine | sql.Connection) -> bool:
 
 def _prepare(connection: Any, _: Any) -> None:
     connection.isolation_level = None  # SQLAlchemy begins transactions, not Python's module
-    for setting in ("journal_mode = WAL", "synchronous = NORMAL", "busy_timeout = 5000"):
+    for setting in (
+        "journal_mode = WAL",
+        "synchronous = NORMAL",
+        "busy_timeout = 5000",
+        f"wal_autocheckpoint = {_MOST_PAGES}",
+    ):
         connection.execute(f"PRAGMA {setting}")
 
 
@@ -144,24 +151,64 @@ _SHARE_LOCKS = sql.text(
 )
 
 
-@contextlib.contextmanager
-def writing(engine: sql.Engine, *, lasting: bool) -> Generator[sql.Connection]:
-    """A connection in a transaction, which is committed at the end.
+class Channel:
+    """The connection of one thread that writes, made anew after an error.
 
     Args:
         engine: of the records.
-        lasting: whether what is committed must survive also a power cut; otherwise, the end of this
-            process however it comes. PostgreSQL flushes everything at once unless it is set up to
-            flush late.
-
-    Yields:
-        The connection.
     """
-    with engine.connect() as connection:
-        if not is_postgresql(connection):
-            raw: Any = connection.connection.dbapi_connection
-            raw.execute(f"PRAGMA synchronous = {'FULL' if lasting else 'NORMAL'}")
-        with connection.begin():
-            if lasting and is_postgresql(connection):
-                connection.exec_driver_sql("SET LOCAL synchronous_commit = on")
-            yield connection
+
+    def __init__(self, engine: sql.Engine) -> None:
+        self._engine = engine
+        self._connection: sql.Connection | None = None
+
+    @contextlib.contextmanager
+    def transaction(self, *, lasting: bool) -> Generator[sql.Connection, None, None]:
+        """A transaction, which is committed at the end.
+
+        Args:
+            lasting: whether PostgreSQL must flush what is committed, as it does unless it is set up
+                to flush late. For a SQLite file, see `qbumpers.study.flushing`.
+
+        Yields:
+            Its connection.
+        """
+        connection = self._connection = self._connection or self._engine.connect()
+        try:
+            with connection.begin():
+                if lasting and is_postgresql(connection):
+                    connection.exec_driver_sql("SET LOCAL synchronous_commit = on")
+                yield connection
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Give the connection back; the next transaction has another one."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            connection.close()
+
+
+def insert(connection: sql.Connection, table: sql.Table, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Add rows; columns that a row lacks are null, numbers that count up by themselves are left.
+
+    Args:
+        connection: in a transaction.
+        table: to which they are added.
+        rows: columns by name.
+    """
+    statement, names, by_place = _insertion(table, connection.dialect)
+    if by_place:
+        connection.exec_driver_sql(statement, [tuple(map(row.get, names)) for row in rows])
+    else:
+        connection.exec_driver_sql(statement, [{n: row.get(n) for n in names} for row in rows])
+
+
+@functools.cache
+def _insertion(table: sql.Table, dialect: sql.Dialect) -> tuple[str, tuple[str, ...], bool]:
+    """A statement, compiled once, the columns that it takes, and whether it takes them by place."""
+    columns = [column.name for column in table.c if column.autoincrement is not True]
+    compiled = table.insert().compile(dialect=dialect, column_keys=columns)
+    by_place: Sequence[str] | None = compiled.positiontup
+    return str(compiled), tuple(by_place or columns), by_place is not None

@@ -170,7 +170,7 @@ def take_session(engine: sql.Engine, session: str) -> Tenure | None:
 def drives(engine: sql.Engine, tenure: Tenure) -> bool:
     """Whether nobody has taken a session since."""
     with reading(engine) as connection:
-        return latest_tenures(connection, [tenure.session])[tenure.session] == tenure.number
+        return latest_tenures(connection, [tenure.session]).get(tenure.session) == tenure.number
 
 
 def latest_tenures(connection: sql.Connection, sessions: Sequence[str]) -> dict[str, int]:
@@ -289,12 +289,35 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
     return Recorded(session, int(found["seed"]), json.loads(found["setup"]), played)
 
 
-def read_times(engine: sql.Engine, session: str) -> list[dict[str, Any]]:
-    """The device and the times of each step of a session, in their order, see `TIMES`."""
-    columns = (STEPS.c.device, *(STEPS.c[name] for name in TIMES))
+class Moment(NamedTuple):
+    """How a step came about.
+
+    Attributes:
+        device: that the participant used.
+        shown: see `TIMES`.
+        pressed: likewise.
+        received: likewise.
+        applied: likewise.
+    """
+
+    device: str
+    shown: float | None
+    pressed: float | None
+    received: float | None
+    applied: float | None
+
+
+def read_moments(engine: sql.Engine, session: str) -> list[Moment]:
+    """How every step of a session came about, in their order.
+
+    Args:
+        engine: of the records.
+        session: identifier.
+    """
+    columns = [STEPS.c[field] for field in Moment._fields]
+    found = sql.select(*columns).where(STEPS.c.session == session).order_by(STEPS.c.number)
     with reading(engine) as connection:
-        order = sql.select(*columns).where(STEPS.c.session == session).order_by(STEPS.c.number)
-        return [dict(row) for row in connection.execute(order).mappings()]
+        return [Moment(*row) for row in connection.execute(found)]
 
 
 def read_notes(engine: sql.Engine, session: str) -> list[dict[str, Any]]:

@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 
 from qbumpers.assistants import Assistant
+from qbumpers.decisions import Step
 from qbumpers.study.game import Episode, Game
 from qbumpers.study.setup import Setup
+from qbumpers.tasks.display import Display
 
 
 def task_view(setup: Setup) -> dict[str, Any]:
@@ -52,18 +54,28 @@ def state_view(game: Game, *, with_view: bool = True) -> dict[str, Any]:
     return {
         "number": game.number,
         "episode": episode_view(game.episodes[-1]),
-        "scene": list(display.scene(game.state, game.last)),
-        "words": display.words(game.state),
-        "last": _last_view(game),
+        **picture(display, game.state, game.last),
         "view": assistant_view(game) if with_view else None,
     }
 
 
-def _last_view(game: Game) -> dict[str, Any] | None:
+def picture(display: Display, state: Any, last: Step | None) -> dict[str, Any]:
+    """A state as it is drawn and said, with the step that led to it, JSON-like.
+
+    Args:
+        display: of the task.
+        state: to be shown.
+        last: the step before; None at the start of an episode.
+    """
+    return {
+        "scene": list(display.scene(state, last)),
+        "words": display.words(state),
+        "last": None if last is None else _last_view(last),
+    }
+
+
+def _last_view(step: Step) -> dict[str, Any]:
     """What was proposed and done on the last step."""
-    step = game.last
-    if step is None:
-        return None
     return {
         "proposed": int(step.proposed),
         "executed": int(step.executed),

@@ -10,7 +10,8 @@ import sqlalchemy as sql
 from sqlalchemy.exc import OperationalError
 
 from qbumpers.errors import RequestError
-from qbumpers.study.stores import is_postgresql, share_locks, writing
+from qbumpers.study.flushing import Flusher
+from qbumpers.study.stores import Channel, insert, is_postgresql, share_locks
 from qbumpers.study.tables import Tenure, latest_tenures
 
 Row = tuple[sql.Table, Mapping[str, Any]]
@@ -42,7 +43,8 @@ class Writer:
     """
 
     def __init__(self, engine: sql.Engine) -> None:
-        self._engine = engine
+        self._engine, self._channel = engine, Channel(engine)
+        self._flusher = None if is_postgresql(engine) else Flusher(engine)
         self._waiting: queue.SimpleQueue[_Addition | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="records", daemon=True)
         self._thread.start()
@@ -82,6 +84,9 @@ class Writer:
             if group and not self._committed(group, last=len(group) == 1):
                 for addition in group:  # one that fails must not take others with it
                     self._committed([addition], last=True)
+        self._channel.close()
+        if self._flusher is not None:
+            self._flusher.close()
 
     def _group(self) -> tuple[list[_Addition], bool]:
         """What is waiting now, and whether the end has come."""
@@ -97,10 +102,10 @@ class Writer:
         """Whether whoever waits knows how it went: not if one of several failed."""
         try:
             lasting = any(addition.lasting for addition in group)
-            with writing(self._engine, lasting=lasting) as connection:
+            with self._channel.transaction(lasting=lasting) as connection:
                 _check_tenures(connection, group)
                 for table, rows in _by_table(group).items():
-                    connection.execute(table.insert(), rows)  # many rows at once take less time
+                    insert(connection, table, rows)  # many rows at once take less time
         except Exception as error:  # whatever it is, those who wait must hear of it
             if isinstance(error, OperationalError) and is_postgresql(self._engine):
                 reason = str(error.orig).strip().partition("\n")[0]
@@ -111,7 +116,10 @@ class Writer:
                 return False
         else:
             for addition in group:
-                addition.done.set_result(None)
+                if addition.lasting and self._flusher is not None:
+                    self._flusher.flush(addition.done)
+                else:
+                    addition.done.set_result(None)
         return True
 
 

@@ -67,7 +67,8 @@ class Display(NamedTuple):
         actions: a name for each action.
         keys: from a key (`KeyboardEvent.code`) to its action.
         rate: steps per second; 0 if every step waits for a key.
-        idle: the action while no key is down, of tasks with a rate; -1 if there is none.
+        idle: the action while no key is down, of tasks with a rate; -1 if there is none, so that
+            all actions take turns.
         backdrop: what never changes, drawn first.
         scene: what shows the state (number or observation) and the last step.
         words: says the state, for who does not see the picture.

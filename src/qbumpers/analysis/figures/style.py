@@ -57,6 +57,7 @@ _STYLE: Any = {
     "axes.titlesize": 11,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # looking for a place above all labels is a tenth of the time
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -204,6 +205,9 @@ def save(drawing: Figure, folder: Path, name: str) -> Path:
     with _style():
         # Laid out once for both; `savefig` would lay out and draw everything twice for each.
         drawing.dpi = _STYLE["savefig.dpi"]
+        for axes in drawing.axes:
+            if not axes.get_title("left"):  # else its place is looked for in every drawing
+                axes.set_title("")
         engine = drawing.get_layout_engine()
         if engine is not None:
             engine.execute(drawing)

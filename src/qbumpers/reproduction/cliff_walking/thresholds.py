@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from qbumpers.assistants import make_assistant
-from qbumpers.decisions import Noise, begin, situate
+from qbumpers.decisions import Noise, Situation
 from qbumpers.tasks.cliff_walking import ACTION_NAMES, COLUMNS, GOAL, ROWS, is_cliff, state_of
 
 KINDS = ("onto the cliff", "backwards beside the cliff", "away from the cliff")
@@ -87,10 +87,12 @@ def overridden(table: np.ndarray, alpha: float, second: bool = False) -> np.ndar
         bool [S, A].
     """
     assistant = make_assistant("local-q-thresholding", alpha=float(alpha), second=second)
-    decided = np.zeros(table.shape, np.bool_)
+    decided, others = np.zeros(table.shape, np.bool_), np.zeros((0, table.shape[1]))
     for state, action in np.ndindex(*table.shape):
-        account = begin(table[state], 0)
-        situation = situate(account, state, table[state], np.zeros((0, table.shape[1])), action)
+        situation = Situation(
+            state=state, values=table[state], others=others, proposed=action, earned=0.0,
+            discount=1.0, start_value=table[state].max(), episode=0, step=0,
+        )  # fmt: skip
         decided[state, action] = assistant.decide(situation, Noise(0.5, 0.5)).action != action
     return decided
 

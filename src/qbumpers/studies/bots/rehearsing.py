@@ -16,7 +16,8 @@ from qbumpers.studies.bots.person import Person
 from qbumpers.studies.design.models import Study
 from qbumpers.studies.design.parts import Sitting
 from qbumpers.studies.flow.server import PAGE, StudyHost
-from qbumpers.study.running import configuration, listening_at
+from qbumpers.study.addresses import listening_at
+from qbumpers.study.running import configuration
 from qbumpers.study.server import make_application
 from qbumpers.study.setup import Setup
 

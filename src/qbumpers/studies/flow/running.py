@@ -1,14 +1,12 @@
-"""Serving a study on this machine, and its records in its folder."""
+"""Serving a study, and its records in its folder."""
 
 import contextlib
 import sqlite3
-import threading
-import webbrowser
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import sqlalchemy as sql
-import uvicorn
 
 from qbumpers.errors import RequestError
 from qbumpers.studies.design.freezing import check_frozen, content_of, hash_of
@@ -16,7 +14,8 @@ from qbumpers.studies.design.models import Study
 from qbumpers.studies.flow.researcher import researcher_routes
 from qbumpers.studies.flow.server import PAGE, StudyHost
 from qbumpers.studies.flow.tables import open_study
-from qbumpers.study.running import configuration, listening_at
+from qbumpers.study.addresses import Address
+from qbumpers.study.running import serve
 from qbumpers.study.server import make_application
 from qbumpers.study.setup import Setup
 
@@ -52,36 +51,33 @@ def opened(
     return open_study(records_of(folder, mode), study.name, mode, digest)
 
 
-def serve(
+def serve_study(
     host: StudyHost,
     setups: Mapping[str, Setup],
+    address: Address,
     *,
-    port: int,
     browser: bool,
-    announce: Callable[[str, str], None],
+    announce: Callable[[str], None],
 ) -> None:
-    """Serve a study on this machine until Ctrl-C.
+    """Serve a study until Ctrl-C.
 
     Args:
         host: of the study.
         setups: what is played in each block, by its id.
-        port: of 127.0.0.1; any that is free if 0.
+        address: where to listen, checked.
         browser: whether to open the page in a browser.
-        announce: is called with the page's URL, and the researcher's, before anyone is served.
+        announce: is called with the page's URL before anyone is served; the researcher's page is
+            `researcher` under it.
 
     Raises:
-        RequestError: if the port is in use.
+        RequestError: if the address is in use.
     """
-    with contextlib.closing(listening_at(port)) as listening:
-        address = f"127.0.0.1:{listening.getsockname()[1]}"
-        url = f"http://{address}/"
-        hosts = [address, address.replace("127.0.0.1", "localhost")]
-        announce(url, f"{url}researcher")
-        if browser:
-            threading.Thread(target=webbrowser.open, args=[url], daemon=True).start()
+
+    def make(hosts: list[str]) -> Any:
         routes = [*host.routes(), *researcher_routes(host, setups)]
-        application = make_application(host, hosts, PAGE, routes)
-        uvicorn.Server(configuration(application)).run([listening])
+        return make_application(host, hosts, PAGE, routes, address.scheme)
+
+    serve(make, address, browser=browser, announce=announce)
 
 
 def back_up(records: Path, copy: Path) -> None:

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import functools
 import secrets
 import time
 from collections.abc import Mapping, Sequence
@@ -14,6 +13,7 @@ from itsdangerous import BadSignature, URLSafeSerializer
 from starlette.requests import Request
 from starlette.responses import JSONResponse
 from starlette.routing import BaseRoute, Route
+from starlette.websockets import WebSocket
 
 import qbumpers
 from qbumpers.errors import RequestError
@@ -47,7 +47,7 @@ from qbumpers.studies.flow.tables import (
 from qbumpers.studies.flow.visit import StudyConnection, Visit
 from qbumpers.study.connection import MESSAGES_PER_SECOND, GoneError
 from qbumpers.study.game import Game, resumed
-from qbumpers.study.server import UnknownSessionError
+from qbumpers.study.server import Entrance, UnknownSessionError
 from qbumpers.study.setup import Setup
 from qbumpers.study.tables import (
     SESSIONS,
@@ -63,7 +63,7 @@ PAGE = "study.html"
 """The page of a study in the folder of pages."""
 
 
-class StudyHost:
+class StudyHost(Entrance):
     """A study that is being served; one process serves it, and assigns one after the other.
 
     Args:
@@ -81,8 +81,6 @@ class StudyHost:
         engine: of the records.
         exposed: see above.
         second: see above.
-        connection: a page of it at the other end of a socket.
-        open: how many pages there are.
         visits: participants who are there, by identifier.
         token: that opens the researcher's page.
     """
@@ -97,18 +95,19 @@ class StudyHost:
         exposed: bool = False,
         second: float = 1.0,
     ) -> None:
+        super().__init__()
         self.study, self.engine, self.exposed, self.second = study, engine, exposed, second
         self.conditions = {condition.name: condition for condition in study.all_conditions()}
         self.writer = Writer(engine)
-        self.open = 0
-        # Simulated learners are quicker than people.
-        allowed = 1e6 if exposed else MESSAGES_PER_SECOND
-        self.connection = functools.partial(StudyConnection, per_second=allowed)
         self.visits: dict[str, Visit] = {}
         self.token = secrets.token_urlsafe(16)
         self._setups, self._mode = setups, mode
         self._signer = URLSafeSerializer(secret_of(engine), salt="participant")
         self._finding, self._assigning = asyncio.Lock(), asyncio.Lock()
+
+    def connection(self, socket: WebSocket) -> StudyConnection:
+        """A page at the other end of a socket; simulated learners are quicker than people."""
+        return StudyConnection(socket, 1e6 if self.exposed else MESSAGES_PER_SECOND)
 
     def routes(self) -> Sequence[BaseRoute]:
         """What is served beside the page and its socket."""

@@ -12,7 +12,7 @@ from qbumpers.studies.design.parts import Block
 from qbumpers.studies.flow.standing import Standing, attempts_at, standing
 from qbumpers.studies.flow.tables import Event, events_of, participants_in, session_name
 from qbumpers.study.game import Episode
-from qbumpers.study.tables import read_session, read_times
+from qbumpers.study.tables import read_moments, read_session
 
 
 class BlockPlayed(NamedTuple):
@@ -24,7 +24,7 @@ class BlockPlayed(NamedTuple):
         session: identifier of the session.
         episodes: in order.
         steps: of each of them.
-        times: of every step, with its device, see `qbumpers.study.tables.read_times`.
+        times: of every step, with its device, see `qbumpers.study.tables.Moment`.
     """
 
     block: str
@@ -115,7 +115,7 @@ def read_participant(
                 for number, played in enumerate(recorded.played)
             ]
             steps = [played.steps for played in recorded.played]
-            times = read_times(engine, session)
+            times = [moment._asdict() for moment in read_moments(engine, session)]
             blocks.append(BlockPlayed(block, phases[block], session, episodes, steps, times))
     return Participant(name, came, standing(study, events), events, blocks)
 

@@ -64,6 +64,7 @@ export class LearningCurve {
 export class ProjectedCurve {
   #chart = null;
   #data = [[], [], []];
+  #mark = null;
 
   constructor(place) {
     this.place = place;
@@ -85,12 +86,26 @@ export class ProjectedCurve {
     if (steps.length > 1) this.#show();
   }
 
+  // A whole episode: [steps, projected returns, floors].
+  whole(data) {
+    this.clear();
+    this.#data = data;
+    if (data[0].length > 1) this.#show();
+  }
+
+  // Draws a line at a step.
+  mark(step) {
+    this.#mark = step;
+    this.#chart?.redraw(false);
+  }
+
   #show() {
     if (this.#chart) return this.#chart.setData(this.#data);
     const options = {
       ...sizeOf(this.place, 130),
       legend: { show: false },
       cursor: { show: false },
+      hooks: { draw: [(chart) => this.#drawMark(chart)] },
       scales: { x: { time: false } },
       axes: axes("step"),
       series: [
@@ -100,6 +115,13 @@ export class ProjectedCurve {
       ],
     };
     this.#chart = new uPlot(options, this.#data, this.place);
+  }
+
+  #drawMark({ ctx, bbox, valToPos }) {
+    if (this.#mark === null) return;
+    const x = valToPos.call(this.#chart, this.#mark, "x", true);
+    ctx.fillStyle = colour("--ink");
+    ctx.fillRect(x - devicePixelRatio / 2, bbox.top, devicePixelRatio, bbox.height);
   }
 }
 

@@ -110,6 +110,13 @@ export class Input {
   }
 }
 
+// The first key of each action, in words; nothing for who has no keyboard at hand.
+export function keysOf(task) {
+  if (matchMedia("(hover: none) and (pointer: coarse)").matches) return "";
+  const named = Object.entries(task.keys).filter(([, action], place, all) => all.findIndex((each) => each[1] === action) === place);
+  return `Keys: ${named.map(([code, action]) => `${keyName(code)} ${task.actions[action]}`).join(", ")}.`;
+}
+
 export function keyName(code) {
   return code.replace(/^(Key|Digit)/, "").replace(/^Arrow(\w+)/, (_, way) => ARROWS[way.toLowerCase()]);
 }

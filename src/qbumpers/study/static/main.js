@@ -4,7 +4,7 @@ import { Board } from "./board.js";
 import { ChoiceForm } from "./choice.js";
 import { LearningCurve } from "./curve.js";
 import { byId, shown } from "./dom.js";
-import { Input } from "./input.js";
+import { Input, keysOf } from "./input.js";
 import { Link } from "./link.js";
 import { describe, Panel } from "./panel.js";
 
@@ -81,7 +81,7 @@ function welcome(message) {
   curve.show(episodes);
   if (!episodes.length) {
     byId("words").textContent = "";
-    offer("Ready?", "An assistant watches, and may step in.", "Play", begin);
+    offer("Ready?", `An assistant watches, and may step in. ${keysOf(task)}`, "Play", begin);
   }
 }
 

@@ -26,7 +26,10 @@ MOUNTAIN_CAR_ACTIONS = ("left", "nothing", "right")
 
 
 def cart_pole_display() -> Display:
-    """CartPole; every step waits for a key, since no action leaves the cart alone."""
+    """CartPole at half its speed, which a person can follow.
+
+    No action leaves the cart alone: while no key is down, left and right take turns.
+    """
     edge = 2.4  # metres from the middle, where episodes end
     per_metre = _WIDTH / (2 * edge)
     backdrop = [
@@ -53,7 +56,7 @@ def cart_pole_display() -> Display:
             f"{_side(angle)}"
         )
 
-    return _display(CART_POLE_ACTIONS, 0.0, -1, backdrop, scene, words)
+    return _display(CART_POLE_ACTIONS, 25.0, -1, backdrop, scene, words)
 
 
 def mountain_car_display() -> Display:
