@@ -283,18 +283,18 @@ async def _play(sessions: Entrance, connection: Connection, hello: Hello) -> Non
 def make_application(
     sessions: Entrance,
     hosts: Collection[str],
+    scheme: str = "http",
     file: str = "index.html",
     routes: Sequence[BaseRoute] = (),
-    scheme: str = "http",
 ) -> Any:
     """The server as an ASGI application.
 
     Args:
         sessions: that are played on it; closed when it ends.
         hosts: names with ports by which pages may address it.
+        scheme: "http" or "https", of the pages.
         file: name of its page in `STATIC`.
         routes: further ones.
-        scheme: "http" or "https", of the pages.
     """
 
     async def page(_: Request) -> FileResponse:

@@ -66,7 +66,9 @@ def serving(
     with contextlib.closing(listening_at(0)) as listening:
         address = f"127.0.0.1:{listening.getsockname()[1]}"
         host = make_host()
-        application = make_application(host, [address], PAGE, [*host.routes(), *more(host)])
+        application = make_application(
+            host, [address], file=PAGE, routes=[*host.routes(), *more(host)]
+        )
         server = uvicorn.Server(configuration(application))
         thread = threading.Thread(target=server.run, args=[[listening]], daemon=True)
         thread.start()

@@ -75,7 +75,7 @@ def serve_study(
 
     def make(hosts: list[str]) -> Any:
         routes = [*host.routes(), *researcher_routes(host, setups)]
-        return make_application(host, hosts, PAGE, routes, address.scheme)
+        return make_application(host, hosts, address.scheme, PAGE, routes)
 
     serve(make, address, browser=browser, announce=announce)
 

@@ -94,7 +94,7 @@ def _assigned(study: Study, before: Standing, event: Event) -> Standing:
     content: Mapping[str, Any] = event.content
     yoke = _yoke(content) if content["partner"] else None
     return before._replace(
-        parts=tuple(study.orders()[content["order"]]),
+        parts=tuple(study.orders()[int(content["order"])]),
         condition=content["condition"],
         order=content["order"],
         partner=content["partner"],
