@@ -14,6 +14,8 @@ from qbumpers.studies.bots.person import Person
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run")
 """With which Chromium is started."""
 
+_ASKED_WITHIN = 0.05  # seconds after a state
+
 
 async def by_browser(address: str, person: Person, arrival: Mapping[str, str]) -> Taken:
     """Take part through Chromium, see `qbumpers.studies.bots.rehearsing.TakePart`.
@@ -119,10 +121,6 @@ class _BrowserPage:
             )
             if self._shown["over"] or not self._going_on():
                 await page.click("#choices button.primary")
-        elif kind == "ask":
-            names = {"me": 1, "assistant": 2, "unsure": 3}
-            chosen = names[self._person.attribution()]
-            await page.click(f"#choices button:nth-child({chosen})")
         elif kind == "state":
             action = self._person.play(self._shown["id"], message)
             if action is None:
@@ -132,7 +130,19 @@ class _BrowserPage:
                     "step => document.getElementById('step').textContent === String(step)",
                     arg=message["episode"]["length"],
                 )
+                await self._answer_if_asked()
                 await page.keyboard.press(self._keys[action])
+
+    async def _answer_if_asked(self) -> None:
+        """Whose move it was, if that is asked: it comes right after a state."""
+        await asyncio.sleep(_ASKED_WITHIN)
+        waiting: list[dict[str, Any]] = list(self._heard._queue)  # type: ignore[attr-defined]
+        if not waiting or waiting[0]["type"] != "ask":
+            return
+        self._heard.get_nowait()
+        chosen = {"me": 1, "assistant": 2, "unsure": 3}[self._person.attribution()]
+        await self._page.click(f"#choices button:nth-child({chosen})")
+        await self._page.wait_for_selector("#overlay", state="hidden")
 
     def _going_on(self) -> bool:
         """Whether the state of an episode that goes on has been sent already."""
