@@ -268,7 +268,7 @@ def test_simulated_learners_take_part_in_the_browser(tmp_path):
         {"kind": "questionnaire", "instrument": "nasa-tlx"},
         {"kind": "questionnaire", "instrument": "trust"},
         {"kind": "questionnaire", "instrument": "background"},
-        rehearsal={"drop_out": 0.0, "reload": 0.0},
+        rehearsal={"drop_out": 0.0, "reload": 1.0},
     )  # fmt: skip
     path, setups = tmp_path / "simulated.sqlite", setups_of(study)
     engine = open_study(path, study.name, "simulated", "digest")
