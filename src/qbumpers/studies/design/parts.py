@@ -140,7 +140,8 @@ class Block(Part):
             left out.
         task: another one than the study's, for instance another terrain or remapped keys.
         values: of that task, the path of a file; as for the study if left out.
-        attribution: how many questions "was that you?" are asked in each assisted episode at most.
+        attribution: how many questions "was that you?" are asked in each assisted episode at most;
+            after a reload in its middle, the count begins anew.
     """
 
     kind: Literal["block"]
