@@ -9,10 +9,10 @@ import dataclasses
 import importlib.util
 import statistics
 import time
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from blocks import block
 from measuring import Row, Target, Timed, alternate, compared, is_quick, show
 
 from qbumpers.assistants import make_assistant
@@ -157,21 +157,6 @@ def whole_learner(times: Steps) -> Row:
     title = f"a learner of 2 x {_WHOLE:,} episodes"
     baseline = f"at {_LENGTHS[0]} and {_LENGTHS[1]} steps each"
     return Row(title, statistics.median(seconds), "core-s", baseline, target=Target(40))
-
-
-def block(condition: Condition, trial: int) -> tuple[float, float]:
-    """In a process of its own: steps per second of the clock on the wall, and its peak memory.
-
-    Memory is of the whole process, in MB; NaN if the system does not tell.
-    """
-    begin = time.perf_counter()
-    steps = run(condition, trials=range(trial, trial + 1)).steps
-    rate = steps / (time.perf_counter() - begin)
-    status = Path("/proc/self/status")
-    if not status.exists():
-        return rate, float("nan")
-    peak = status.read_text().split("VmHWM:")[1].split()[0]
-    return rate, int(peak) * 1024 / 1e6
 
 
 def processes(rounds: int) -> list[Row]:

@@ -166,3 +166,30 @@ def _borrowed(typing_context: Any, table: Any, index: Any, width: Any) -> Any:
         return view._getvalue()
 
     return row_type(table, types.intp, width), generate
+
+
+def scratch(shape: Any, value: Any) -> np.ndarray:
+    """An array for the intermediate results of one step, of which nothing may be kept after it.
+
+    On a graphics card nothing can be allocated: there it is a part of memory that each trial has,
+    and uses again from step to step.
+
+    Args:
+        shape: a whole number, or a tuple of them.
+        value: with which it is filled; its type, bool, int or float, is that of the array.
+    """
+    return np.full(shape, value)
+
+
+@overload(scratch, strict=False, jit_options=INLINE)
+def _compiled_scratch(shape: Any, value: Any) -> Any:
+    return lambda shape, value: np.full(shape, value)
+
+
+def clear_scratch() -> None:
+    """Give up everything that `scratch` has given."""
+
+
+@overload(clear_scratch, strict=False, jit_options=INLINE)
+def _compiled_clear_scratch() -> Any:
+    return lambda: None

@@ -46,16 +46,18 @@ def candidate_value(values: np.ndarray, second: bool) -> float:
 
 
 @compiled
-def only(values: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-    """The values [A] of the actions that are allowed, bool [A]; minus infinity elsewhere.
+def keep_only(values: np.ndarray, allowed: np.ndarray, out: np.ndarray) -> None:
+    """Write down the values of the actions that are allowed, and minus infinity for the others.
 
     `best_value` and `pick` then choose among those actions.
+
+    Args:
+        values: float64 [A].
+        allowed: bool [A].
+        out: float64 [A], overwritten.
     """
-    found = np.full(len(values), -np.inf)
     for action in range(len(values)):
-        if allowed[action]:
-            found[action] = values[action]
-    return found
+        out[action] = values[action] if allowed[action] else -np.inf
 
 
 @compiled

@@ -112,11 +112,14 @@ def shortened(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def compiling_together(what: str) -> Iterator[None]:
+def compiling_together(
+    what: str, reason: Callable[[BaseException], str] = shortened
+) -> Iterator[None]:
     """Within the block, an error of compiling says what was compiled.
 
     Args:
         what: for the message, for instance "assistant guide, learner q-learning".
+        reason: says in words what an error of Numba means.
 
     Raises:
         RequestError: in place of Numba's error.
@@ -124,7 +127,7 @@ def compiling_together(what: str) -> Iterator[None]:
     try:
         yield
     except NumbaError as error:
-        raise RequestError(f"{what}: cannot be compiled together: {shortened(error)}") from error
+        raise RequestError(f"{what}: cannot be compiled together: {reason(error)}") from error
 
 
 def compiles() -> bool:

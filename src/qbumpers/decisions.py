@@ -199,7 +199,7 @@ def begin(values: np.ndarray, episode: int) -> Account:
         values: float64 [A], Q*(s_0, .).
         episode: episodes of this learner or participant before this one.
     """
-    return Account(0.0, 1.0, float(best_value(values)), episode, 0)
+    return Account(0.0, 1.0, np.float64(best_value(values)), episode, 0)
 
 
 @inlined

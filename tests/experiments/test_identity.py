@@ -54,6 +54,18 @@ def test_a_raised_revision_is_another_identity(part):
     assert "was 1 and is 2" in differences(before.parts, after.parts)
 
 
+def test_a_graphics_card_and_what_compiles_for_it_are_part_of_it():
+    here = identity()
+    engine: dict[str, Any] = {**ENGINE, "gpu": {"revision": 1, "numba-cuda": "0.30.4"}}
+    on_card = identity(engine=engine)
+    assert not on_card.allows_unmarked
+    assert "the processor was gpu" in differences(on_card.parts, here.parts)
+    for field, message in (("revision", "engine on a GPU was 1 and is 2"), ("numba-cuda", "is 2")):
+        later = identity(engine={**engine, "gpu": {**engine["gpu"], field: 2}})
+        assert later.digest not in (here.digest, on_card.digest)
+        assert message in differences(on_card.parts, later.parts)
+
+
 @pytest.mark.parametrize("field", ["processor", "precision"])
 def test_processor_and_precision_are_part_of_it(monkeypatch, field):
     before = identity()

@@ -3,6 +3,7 @@
 import pytest
 
 from qbumpers.study.game import Choice, Game
+from qbumpers.study.tables import Moment
 from tests.study.serving import AROUND
 from tests.study.soak import STORES, Page, held, soak
 
@@ -23,7 +24,11 @@ def log(cliff):
     for number, step in enumerate(steps):
         page.sent[number] = {float(number): step.proposed}
         page.seen[number] = (step.proposed, step.executed, step.overridden, step.reward)
-    return page, steps, [{"pressed": float(number)} for number in range(len(steps))]
+    return (
+        page,
+        steps,
+        [Moment("keyboard", 0.0, float(number), 0.0, 0.0) for number in range(len(steps))],
+    )
 
 
 def test_a_log_that_agrees_is_no_problem(log):

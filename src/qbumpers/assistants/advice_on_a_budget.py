@@ -88,8 +88,11 @@ def advises(
         return values[proposed] < best
     if options.when == _PREDICTIVE:
         return memory.mistaken[state]
-    seen = memory.proposals[state]
-    return seen.sum() == 0 or seen.max() < options.sure * seen.sum()
+    most = total = 0
+    for action in range(len(values)):
+        most = max(most, memory.proposals[state, action])
+        total += memory.proposals[state, action]
+    return total == 0 or most < options.sure * total
 
 
 @compiled

@@ -168,7 +168,7 @@ class Assistant:
                     ) from error
 
 
-def make_assistant(name: str, /, **options: Any) -> Assistant:
+def make_assistant(name: str, **options: Any) -> Assistant:
     """An assistant: a rule by name, with checked options.
 
     Args:

@@ -11,10 +11,9 @@ and if B is not empty, the best of it by the mean over goals is executed. There 
 
 from typing import NamedTuple
 
-import numpy as np
-
 from qbumpers.assistants.registry import register_assistant
-from qbumpers.choice import best_value, only, pick
+from qbumpers.borrowing import scratch
+from qbumpers.choice import best_value, keep_only, pick
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Noise, Situation
 
@@ -34,12 +33,14 @@ def better_for_all_goals(
     `stochastic-q-bumpers` takes over once the mean over goals is too low.
     """
     goals, proposed = situation.others, situation.proposed
-    better = np.ones(len(situation.values), np.bool_)
+    better, found = scratch(len(situation.values), True), False
     for action in range(len(better)):
         for goal in range(len(goals)):
             if goals[goal, action] <= goals[goal, proposed]:
                 better[action] = False
-    if not better.any():
+        found = found or better[action]
+    if not found:
         return Decision(proposed, 0.0)
-    allowed = only(situation.values, better)
+    allowed = scratch(len(better), 0.0)
+    keep_only(situation.values, better, allowed)
     return Decision(pick(allowed, best_value(allowed), noise.tie), 1.0)

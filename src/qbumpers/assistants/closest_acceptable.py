@@ -14,7 +14,8 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.assistants.registry import register_assistant, unchanged
-from qbumpers.choice import best_value, only, pick, worst_value
+from qbumpers.borrowing import scratch
+from qbumpers.choice import best_value, keep_only, pick, worst_value
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation
 
@@ -33,12 +34,20 @@ def nearest_acceptable(
         tie: in [0, 1), which of equally good ones.
     """
     lowest = worst_value(values)
-    acceptable = values - lowest >= (1 - alpha) * (best_value(values) - lowest)
-    if acceptable[proposed]:
+    needed = (1 - alpha) * (best_value(values) - lowest)
+    if values[proposed] - lowest >= needed:
         return Decision(proposed, 0.0)
-    nearness = only(-distance[proposed], acceptable)
-    nearest = only(values, nearness == best_value(nearness))
-    return Decision(pick(nearest, best_value(nearest), tie), 1.0)
+    nearest = np.inf
+    for action in range(len(values)):
+        if values[action] - lowest >= needed:
+            nearest = min(nearest, distance[proposed, action])
+    allowed = scratch(len(values), False)
+    for action in range(len(values)):
+        acceptable = values[action] - lowest >= needed
+        allowed[action] = acceptable and distance[proposed, action] == nearest
+    found = scratch(len(values), 0.0)
+    keep_only(values, allowed, found)
+    return Decision(pick(found, best_value(found), tie), 1.0)
 
 
 class ClosestAcceptableOptions(NamedTuple):

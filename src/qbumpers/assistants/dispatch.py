@@ -94,7 +94,8 @@ def _compiled_start(options: Any, model: Any) -> Any:
 
 
 @overload(observe, strict=False, jit_options=INLINE)
-def _compiled_observe(memory: Any, step: Any, options: Any) -> Any:
+def compiled_observe(memory: Any, step: Any, options: Any) -> Any:
+    """What `observe` is in compiled code, from the types of its arguments."""
     rule = rule_for_options(options.instance_class)
     if rule.observe is None:
         return lambda memory, step, options: memory

@@ -38,6 +38,7 @@ from qbumpers.assistants.mirrors import (
 )
 from qbumpers.assistants.registry import register_assistant
 from qbumpers.assistants.stochastic_q_bumpers import check_floor, override_probability
+from qbumpers.borrowing import scratch
 from qbumpers.choice import best_value, pick
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step, projected_return
@@ -133,7 +134,7 @@ class Outlook(NamedTuple):
 def foreseen(memory: Awareness, state: int) -> Outlook:
     """Where actions lead by the transitions of the task."""
     dynamics, best = memory.dynamics, memory.mirrors.best
-    targets, back = np.zeros((dynamics.actions, MIRRORS)), np.zeros(dynamics.actions)
+    targets, back = scratch((dynamics.actions, MIRRORS), 0.0), scratch(dynamics.actions, 0.0)
     for action in range(dynamics.actions):
         first, before = (state * dynamics.actions + action) * dynamics.outcomes, 0.0
         for index in range(first, first + dynamics.outcomes):
@@ -161,7 +162,7 @@ def least_misleading(
 ) -> int:
     """The override: the better action within the floor that misleads least, else a best one."""
     values, proposed = situation.values, situation.proposed
-    merits = np.full(len(values), -np.inf)
+    merits = scratch(len(values), -np.inf)
     for action in range(len(values)):
         if values[action] > values[proposed] and lost_with(situation, action) < allowed:
             merits[action] = _LEANING * values[action] - misled_credit(shares, targets[action])
@@ -189,7 +190,9 @@ def is_lesson(
     """
     values, proposed, state = situation.values, situation.proposed, situation.state
     targets, cost = outlook.targets, values[action] - values[proposed]
-    harms = (best_value(values) - values) * (1 + _REPEATS * outlook.back)
+    best, harms = best_value(values), scratch(len(values), 0.0)
+    for choice in range(len(values)):
+        harms[choice] = (best - values[choice]) * (1 + _REPEATS * outlook.back[choice])
     helped = lasting_harm(mirrors, shares, state, proposed, action, targets[action], harms, loss)
     if cost >= alpha * helped:  # no lesson does more than to take all harm away
         return False

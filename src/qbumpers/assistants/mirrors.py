@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from qbumpers.borrowing import scratch
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Step
 from qbumpers.tasks.dynamics import TERMINATED
@@ -105,17 +106,20 @@ def _closeness(gap: float, per_gap: float) -> float:
 
 
 @compiled
-def _choices(mirrors: Mirrors, state: int, action: int, loss: float) -> np.ndarray:
-    """Probability that each mirror means an action, float64 [B, K], by temperature.
+def _find_choices(
+    mirrors: Mirrors, state: int, action: int, loss: float, found: np.ndarray
+) -> None:
+    """Probability that each mirror means an action, by temperature.
 
     Args:
         mirrors: what the learner may believe.
         state: where it chooses.
         action: what it chooses.
         loss: what an episode may lose, in reward units; temperatures are shares of it.
+        found: float64 [B, K], zeros that are overwritten.
     """
     values, best, count = mirrors.values, mirrors.best, mirrors.best.shape[1]
-    found, own = np.zeros((len(_TEMPERATURES), MIRRORS)), np.zeros((len(_TEMPERATURES), MIRRORS))
+    own = scratch((len(_TEMPERATURES), MIRRORS), 0.0)
     # Mirrors are innermost, and counted at run time: so the compiler takes several at once.
     for other in range(values.shape[1]):
         for k in range(count):
@@ -132,7 +136,6 @@ def _choices(mirrors: Mirrors, state: int, action: int, loss: float) -> np.ndarr
     for tau in range(len(_TEMPERATURES)):
         for k in range(count):
             found[tau, k] = own[tau, k] / found[tau, k]
-    return found
 
 
 @compiled
@@ -145,16 +148,17 @@ def read(mirrors: Mirrors, state: int, action: int, loss: float) -> Reading:
         action: the proposal.
         loss: what an episode may lose, in reward units.
     """
-    chances, weights = _choices(mirrors, state, action, loss), mirrors.weights
+    chances, weights = scratch((len(_TEMPERATURES), MIRRORS), 0.0), mirrors.weights
+    _find_choices(mirrors, state, action, loss, chances)
     count = weights.shape[2]
-    deliberate, random = np.zeros(MIRRORS), np.zeros(MIRRORS)
+    deliberate, random = scratch(MIRRORS, 0.0), scratch(MIRRORS, 0.0)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             for k in range(count):
                 weight = weights[tau, way, k]
                 deliberate[k] += weight * (1 - _EPSILONS[way]) * chances[tau, k]
                 random[k] += weight * _EPSILONS[way]
-    shares = np.empty(MIRRORS)
+    shares = scratch(MIRRORS, 0.0)
     for k in range(count):
         shares[k] = deliberate[k] + random[k] / mirrors.values.shape[1]
     meant = _sum(deliberate, 0, _TRANSITION)
@@ -168,9 +172,10 @@ def read(mirrors: Mirrors, state: int, action: int, loss: float) -> Reading:
 @compiled
 def _weigh(mirrors: Mirrors, step: Step, loss: float) -> None:
     """Change the weights by a proposal, and let them drift."""
-    chances, weights = _choices(mirrors, step.state, step.proposed, loss), mirrors.weights
+    chances, weights = scratch((len(_TEMPERATURES), MIRRORS), 0.0), mirrors.weights
+    _find_choices(mirrors, step.state, step.proposed, loss, chances)
     count = weights.shape[2]
-    shares, even = np.zeros(MIRRORS), 1 / mirrors.values.shape[1]
+    shares, even = scratch(MIRRORS, 0.0), 1 / mirrors.values.shape[1]
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             for k in range(count):
@@ -179,7 +184,7 @@ def _weigh(mirrors: Mirrors, step: Step, loss: float) -> None:
                 ] * even
                 shares[k] += weights[tau, way, k]
     total = _sum(shares, 0, MIRRORS)
-    fresh = np.empty(MIRRORS)
+    fresh = scratch(MIRRORS, 0.0)
     for k in range(count):
         first = k - k % _PER_PERCEPTION
         held = _sum(shares, first, first + _PER_PERCEPTION) / total
@@ -227,7 +232,7 @@ def reflect(mirrors: Mirrors, step: Step, discount: float, loss: float) -> None:
     """
     _weigh(mirrors, step, loss)
     future = 0.0 if step.events & TERMINATED else discount
-    target = np.empty(MIRRORS)
+    target = scratch(MIRRORS, 0.0)
     for k in range(MIRRORS):
         target[k] = step.reward + future * mirrors.best[step.next_state, k]
     if step.proposed == step.executed:
@@ -296,12 +301,13 @@ def lasting_harm(
 
 
 @compiled
-def _arrivals(shares: np.ndarray) -> np.ndarray:
+def _find_arrivals(shares: np.ndarray, found: np.ndarray) -> None:
     """Share of the learners now at a rate who were at the rate below, the same, the one above.
 
-    float64 [3, K]; the columns sum to 1.
+    Args:
+        shares: float64 [K], how many learners were at each rate.
+        found: float64 [3, K], zeros that are overwritten; the columns then sum to 1.
     """
-    found = np.zeros((3, MIRRORS))
     for k in range(MIRRORS):
         place = k % _PER_PERCEPTION
         lowest, highest = place == 0, place == _PER_PERCEPTION - 1
@@ -314,7 +320,6 @@ def _arrivals(shares: np.ndarray) -> np.ndarray:
         total = found[0, k] + found[1, k] + found[2, k]
         for neighbour in range(3):
             found[neighbour, k] /= total
-    return found
 
 
 @compiled
@@ -323,7 +328,7 @@ def _mix(row: np.ndarray, parts: np.ndarray, padded: np.ndarray) -> None:
 
     Args:
         row: the numbers.
-        parts: float64 [3, K], from `_arrivals`.
+        parts: float64 [3, K], from `_find_arrivals`.
         padded: float64 [K + 2], overwritten but for its ends.
     """
     for k in range(len(row)):
@@ -337,18 +342,20 @@ def _mix(row: np.ndarray, parts: np.ndarray, padded: np.ndarray) -> None:
 def between_episodes(mirrors: Mirrors) -> None:
     """Allow for a learning rate that changes from episode to episode: neighbouring mirrors mix."""
     values, weights = mirrors.values, mirrors.weights
-    shares, padded = np.zeros(MIRRORS), np.zeros(MIRRORS + 2)
+    shares, padded = scratch(MIRRORS, 0.0), scratch(MIRRORS + 2, 0.0)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             for k in range(MIRRORS):
                 shares[k] += weights[tau, way, k]
-    parts = _arrivals(shares)
+    parts = scratch((3, MIRRORS), 0.0)
+    _find_arrivals(shares, parts)
     for state in range(values.shape[0]):
         if mirrors.visited[state]:
             for action in range(values.shape[1]):
                 _mix(values[state, action], parts, padded)
             _find_best(mirrors, state)
-    leaving = _arrivals(np.ones(MIRRORS))
+    leaving = scratch((3, MIRRORS), 0.0)
+    _find_arrivals(scratch(MIRRORS, 1.0), leaving)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             _mix(weights[tau, way], leaving, padded)

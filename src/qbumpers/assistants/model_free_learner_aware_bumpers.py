@@ -18,6 +18,7 @@ from qbumpers.assistants.mirrors import (
 )
 from qbumpers.assistants.registry import register_assistant
 from qbumpers.assistants.stochastic_q_bumpers import check_floor
+from qbumpers.borrowing import scratch
 from qbumpers.choice import best_value
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation, Step
@@ -99,7 +100,7 @@ def recalled(memory: Experience, state: int, values: np.ndarray) -> Outlook:
         values: float64 [A], Q*(s, .).
     """
     best, ideal = memory.mirrors.best, best_value(values)
-    targets, back = np.zeros((len(values), MIRRORS)), np.zeros(len(values))
+    targets, back = scratch((len(values), MIRRORS), 0.0), scratch(len(values), 0.0)
     for action in range(len(values)):
         times = min(memory.seen[state, action], _REMEMBERED)
         if times == 0:

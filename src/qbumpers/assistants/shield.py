@@ -13,7 +13,8 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from qbumpers.assistants.registry import register_assistant
-from qbumpers.choice import best_value, only, pick
+from qbumpers.borrowing import scratch
+from qbumpers.choice import best_value, keep_only, pick
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Noise, Situation
 
@@ -42,5 +43,8 @@ def shield(situation: Situation, noise: Noise, options: ShieldOptions) -> Decisi
         return Decision(proposed, 0.0)
     if safest < options.threshold:
         return Decision(pick(safety, safest, noise.tie), 1.0)
-    safe = only(values, safety >= options.threshold)
+    allowed, safe = scratch(len(values), False), scratch(len(values), 0.0)
+    for action in range(len(values)):
+        allowed[action] = safety[action] >= options.threshold
+    keep_only(values, allowed, safe)
     return Decision(pick(safe, best_value(safe), noise.tie), 1.0)

@@ -16,7 +16,8 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.assistants.registry import register_assistant, unchanged
-from qbumpers.choice import best_value, only, pick
+from qbumpers.borrowing import scratch
+from qbumpers.choice import best_value, keep_only, pick
 from qbumpers.compilation import compiled
 from qbumpers.decisions import Decision, Model, Noise, Situation
 from qbumpers.errors import RequestError
@@ -100,10 +101,16 @@ def trajectory_bumpers(
     path. `stochastic-q-bumpers` never overrides a best action.
     """
     values, proposed = situation.values, situation.proposed
-    within = memory[situation.state] <= options.reach
+    within, found = scratch(len(values), False), False
+    for action in range(len(values)):
+        within[action] = memory[situation.state, action] <= options.reach
+        found = found or within[action]
     if within[proposed]:
         return Decision(proposed, 0.0)
-    allowed = only(values, within) if within.any() else values
+    allowed = scratch(len(values), 0.0)
+    for action in range(len(values)):
+        within[action] = within[action] or not found
+    keep_only(values, within, allowed)
     best = best_value(allowed)
     if allowed[proposed] >= best:
         return Decision(proposed, 0.0)

@@ -8,7 +8,7 @@ from rich.markup import escape
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, interval, table, typeable
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import Imports, On, Workers, backend_for
+from qbumpers.cli.working import Imports, On, PrecisionOfCard, Workers, backend_for, card_for
 from qbumpers.errors import counted
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def compare(
     imports: Imports = None,
     workers: Workers = None,
     on: On = None,
+    precision: PrecisionOfCard = None,
     out: Out = "results/comparison",
 ) -> None:
     """Compare assistants on several tasks and learners, at equal amounts of help.
@@ -84,6 +85,7 @@ def compare(
     from qbumpers.comparison.running import run_cases
 
     with stoppable():
+        card = card_for(workers, on, precision)
         cases = make_cases(
             TASKS if tasks is None else tasks.split(","),
             learner or LEARNERS,
@@ -102,10 +104,10 @@ def compare(
             soft_wrap=True,
         )
         with (
-            backend_for(workers, on) as backend,
+            backend_for(workers, on, card) as backend,
             TrialProgress("simulating", lambda done: None) as progress,
         ):
-            run_cases(cases, out, backend, progress.show)
+            run_cases(cases, out, backend, card, progress.show)
         _analyse(out)
 
 

@@ -17,7 +17,15 @@ from qbumpers.cli.console import (
     typeable,
 )
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
+from qbumpers.cli.working import (
+    Imports,
+    On,
+    Out,
+    PrecisionOfCard,
+    Workers,
+    backend_for,
+    card_for,
+)
 from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
@@ -26,6 +34,7 @@ if TYPE_CHECKING:
     from qbumpers.analysis.findings import LearnerFindings
     from qbumpers.experiments.design import Experiment
     from qbumpers.experiments.run import RunProgress
+    from qbumpers.simulation import Card
 
 
 Profile = Annotated[
@@ -102,6 +111,7 @@ def reproduce(
     seed: Annotated[int, typer.Option(help="Of all random streams.", metavar="N")] = 0,
     workers: Workers = None,
     on: On = None,
+    precision: PrecisionOfCard = None,
     out: Out = None,
 ) -> None:
     """Repeat an experiment of the paper and compare the results with its numbers.
@@ -121,6 +131,7 @@ def reproduce(
     from qbumpers.reproduction.experiments import reproduction
 
     with stoppable():
+        card = card_for(workers, on, precision)
         design = reproduction(
             experiment,
             profile,
@@ -131,7 +142,7 @@ def reproduce(
             values=values,
             seed=seed,
         )
-        _run(design, workers, on, out)
+        _run(design, workers, on, out, card)
 
 
 def _numbers(text: str) -> list[float]:
@@ -155,6 +166,7 @@ def run(
     imports: Imports = None,
     workers: Workers = None,
     on: On = None,
+    precision: PrecisionOfCard = None,
     out: Out = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Run it even if it has more than 10,000 cells of work.")
@@ -173,10 +185,11 @@ def run(
     from qbumpers.experiments.sources import load_experiment
 
     with stoppable():
+        card = card_for(workers, on, precision)
         given = {"trials": trials, "episodes": episodes, "seed": seed}
         changes = {field: number for field, number in given.items() if number is not None}
         design = load_experiment(experiment, large=yes, imports=imports or (), changes=changes)
-        _run(design, workers, on, out)
+        _run(design, workers, on, out, card)
 
 
 @application.command()
@@ -194,12 +207,18 @@ def report(
         _analyse(folder)
 
 
-def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str | None) -> None:
+def _run(
+    experiment: "Experiment",
+    workers: int | None,
+    on: str | None,
+    out: str | None,
+    card: "Card | None",
+) -> None:
     from qbumpers.experiments.plan import make_plan
     from qbumpers.experiments.run import run_experiment
 
     with expert_warnings_printed():
-        plan = make_plan(experiment)
+        plan = make_plan(experiment, card=card)
     folder = out or f"results/{experiment.name}"
     more = f" and {experiment.retention} without the assistant" if experiment.retention else ""
     OUTPUT.print(
@@ -208,7 +227,10 @@ def _run(experiment: "Experiment", workers: int | None, on: str | None, out: str
         f"{more}, into {escape(folder)}",
         soft_wrap=True,
     )
-    with backend_for(workers, on) as backend, TrialProgress("simulating", _announce) as progress:
+    with (
+        backend_for(workers, on, card) as backend,
+        TrialProgress("simulating", _announce) as progress,
+    ):
         run_experiment(plan, folder, backend=backend, report=progress.show)
     _analyse(folder)
 

@@ -10,7 +10,15 @@ from rich.table import Table
 from qbumpers.cli.application import application, stoppable
 from qbumpers.cli.console import OUTPUT, expert_warnings_printed, interval, table
 from qbumpers.cli.progress import TrialProgress
-from qbumpers.cli.working import Imports, On, Out, Workers, backend_for
+from qbumpers.cli.working import (
+    Imports,
+    On,
+    Out,
+    PrecisionOfCard,
+    Workers,
+    backend_for,
+    card_for,
+)
 from qbumpers.errors import counted
 
 if TYPE_CHECKING:
@@ -32,6 +40,7 @@ def tune(
     imports: Imports = None,
     workers: Workers = None,
     on: On = None,
+    precision: PrecisionOfCard = None,
     out: Out = None,
 ) -> None:
     """Find the assistant that teaches best among those that perform above a floor.
@@ -47,8 +56,9 @@ def tune(
     from qbumpers.experiments.sources import load_experiment
 
     with stoppable():
+        card = card_for(workers, on, precision)
         with expert_warnings_printed():
-            plan = make_plan(load_experiment(experiment, imports=imports or ()))
+            plan = make_plan(load_experiment(experiment, imports=imports or ()), card=card)
         folder = out or f"results/{plan.experiment.name}"
         verb = "races" if len(plan.named) == 1 else "race"
         OUTPUT.print(
@@ -58,7 +68,7 @@ def tune(
             soft_wrap=True,
         )
         with (
-            backend_for(workers, on) as backend,
+            backend_for(workers, on, card) as backend,
             TrialProgress("racing", _silent) as progress,
         ):
             found = tuning.tune(

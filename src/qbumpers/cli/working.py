@@ -11,6 +11,7 @@ from qbumpers.errors import RequestError
 
 if TYPE_CHECKING:
     from qbumpers.experiments.run import Backend
+    from qbumpers.simulation import Card
 
 Imports = Annotated[
     list[str] | None,
@@ -27,8 +28,18 @@ On = Annotated[
     str | None,
     typer.Option(
         "--on",
-        help="Run on a Ray cluster: its address, or 'local' for a Ray of its own.",
-        metavar="ADDRESS",
+        help="Run on a graphics card: 'gpu', or 'gpu:1' for the second one; or on a Ray cluster: "
+        "its address, or 'local' for a Ray of its own.",
+        metavar="gpu|ADDRESS",
+    ),
+]
+PrecisionOfCard = Annotated[
+    str | None,
+    typer.Option(
+        "--precision",
+        help="In which a graphics card keeps tables, values and rewards.",
+        show_default="float64",
+        metavar="float64|float32",
     ),
 ]
 Out = Annotated[
@@ -41,11 +52,34 @@ Out = Annotated[
 ]
 
 
-@contextlib.contextmanager
-def backend_for(workers: int | None, on: str | None) -> Generator["Backend", None, None]:
-    """Where cells are worked on: cores of this machine, or a Ray cluster."""
-    from qbumpers.experiments.local import ThisMachine
+def card_for(workers: int | None, on: str | None, precision: str | None) -> "Card | None":
+    """The graphics card that is asked for; None if none is.
 
+    Raises:
+        RequestError: if it cannot be used, or other options do not go with it.
+    """
+    from qbumpers.simulation.cuda.devices import device_of, is_gpu
+
+    if on is None or not is_gpu(on):
+        if precision is not None:
+            raise RequestError(f"--precision {precision}: only with --on gpu")
+        return None
+    if workers is not None:
+        raise RequestError(f"--workers {workers} --on {on}: cores, or a graphics card; give one")
+    return device_of(on, precision or "float64")
+
+
+@contextlib.contextmanager
+def backend_for(
+    workers: int | None, on: str | None, card: "Card | None"
+) -> Generator["Backend", None, None]:
+    """Where cells are worked on: cores of this machine, a graphics card, or a Ray cluster."""
+    from qbumpers.experiments.local import ThisMachine
+    from qbumpers.experiments.on_card import GraphicsCard
+
+    if card is not None:
+        yield GraphicsCard(card)
+        return
     if on is None:
         yield ThisMachine(workers)
         return

@@ -11,6 +11,7 @@ from qbumpers.comparison.methods import METHODS
 from qbumpers.experiments.plan import make_plan
 from qbumpers.experiments.run import Backend, RunProgress, run_experiment
 from qbumpers.files import write_atomically
+from qbumpers.simulation import Card
 
 COMPARISON = "comparison.json"
 """What an output folder notes of the cases that were compared."""
@@ -41,6 +42,7 @@ def run_cases(
     cases: Sequence[Case],
     folder: str | Path,
     backend: Backend,
+    card: Card | None = None,
     report: Callable[[ComparisonProgress], None] = lambda progress: None,
 ) -> None:
     """Run the experiments of all cases: every anchor first, so that reference points stand.
@@ -49,6 +51,7 @@ def run_cases(
         cases: from `make_cases`.
         folder: of the results; a run that was stopped continues there.
         backend: where to run.
+        card: the graphics card, if that is where.
         report: called with the progress after each cell.
 
     Raises:
@@ -59,7 +62,7 @@ def run_cases(
     place = Path(folder)
     parts = [(f"{case.folder}/{ANCHOR_FOLDER}", case.anchors) for case in cases]
     parts += [(f"{case.folder}/{METHOD_FOLDER}", case.methods) for case in cases]
-    plans = {name: make_plan(design) for name, design in parts}
+    plans = {name: make_plan(design, card=card) for name, design in parts}
     write_atomically(place / COMPARISON, lambda path: path.write_text(noted(cases), "utf-8"))
     total = sum(design.trials * design.condition_count() for _, design in parts)
     before = ComparisonProgress(0, total, 0, [], [])

@@ -11,7 +11,9 @@ else decides its numbers, and finished trials are used again only if both are th
   NumPy's version is among them for environments alone: they draw from its generators, whose
   numbers may change between versions. The streams of simulations come from its seed sequences and
   Philox, which do not change, and everything behind them is the package's own.
-- The processor's architecture, and the precision: libraries of elementary functions differ.
+- The processor's architecture, and the precision: libraries of elementary functions differ. On a
+  graphics card, that it was one, and the version of the compiler for it: cards round products and
+  sums together where the compiler says so.
 
 Numba's version is not part of it: compiled code keeps to the arithmetic of IEEE 754 in the order in
 which it is written, and kept numbers are the same in all versions that the package allows. Nor is
@@ -31,6 +33,7 @@ from qbumpers.source import Meaning, meaning_of
 from qbumpers.tasks import Task
 
 _DECIDING_NOTHING = {"pydantic"}
+_GPU = "gpu"  # in the place of the processor's architecture
 _NAMED = 3  # pieces of code in one message at most
 
 
@@ -54,9 +57,11 @@ class Identity(NamedTuple):
     def allows_unmarked(self) -> bool:
         """Whether it may have made trials of a version that noted no identity.
 
-        So it may if nothing of the user's own is in it, and no revision was raised since.
+        So it may if nothing of the user's own is in it, no revision was raised since, and it is
+        none of a graphics card.
         """
-        return not self.parts["own"] and set(self.parts["revisions"].values()) <= {1}
+        unchanged = set(self.parts["revisions"].values()) <= {1}
+        return not self.parts["own"] and unchanged and self.parts["processor"] != _GPU
 
 
 def identity_of(
@@ -68,7 +73,7 @@ def identity_of(
         assistant: whose rules, the ones below it too, are looked at.
         learner: its kind of learner.
         task: its task.
-        engine: `revision` and `precision` of what simulates it.
+        engine: what simulates it, from `qbumpers.simulation.made_by`.
 
     Returns:
         An identity; one that nothing else equals if something cannot be known.
@@ -88,6 +93,10 @@ def identity_of(
         "code": meaning.code,
         "packages": {p: v for p, v in meaning.packages.items() if p not in _DECIDING_NOTHING},
     }
+    if _GPU in engine:
+        parts["processor"] = _GPU
+        parts["revisions"] |= {"engine on a GPU": engine[_GPU]["revision"]}
+        parts["packages"] |= {"numba-cuda": engine[_GPU]["numba-cuda"]}
     if meaning.unknown:
         parts |= {"unknown": list(meaning.unknown), "run": uuid.uuid4().hex}
     return Identity(parts)

@@ -15,7 +15,7 @@ from qbumpers.experiments.learner_designs import RecordedLearner
 from qbumpers.experiments.record import Record, RecordedCondition, file_name, recorded
 from qbumpers.experts import check_expert
 from qbumpers.random_streams import content_digest
-from qbumpers.simulation import Condition, engine_of, make_condition
+from qbumpers.simulation import Card, Condition, check_for_card, made_by, make_condition
 from qbumpers.simulation import run as run_condition
 from qbumpers.tasks import Task
 from qbumpers.values import (
@@ -28,6 +28,7 @@ from qbumpers.values import (
 )
 
 _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last to mean something
+_MOST_ON_CARD = 1 << 16  # trials of a calibration on a card
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
@@ -52,6 +53,7 @@ class Plan(NamedTuple):
         record: what an output folder notes of the conditions.
         files: what is in the files that options and settings name, by the names under which an
             output folder keeps it.
+        card: the graphics card that simulates; None for processors.
     """
 
     experiment: Experiment
@@ -61,20 +63,26 @@ class Plan(NamedTuple):
     conditions: dict[str, Condition]
     record: Record
     files: dict[str, np.ndarray]
+    card: Card | None = None
 
 
-def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | None = None) -> Plan:
+def make_plan(
+    experiment: Experiment,
+    values: TabularValues | NetworkValues | None = None,
+    card: Card | None = None,
+) -> Plan:
     """Check a whole experiment.
 
     Args:
         experiment: what it was made from.
         values: Q* in place of what the experiment names: what an output folder keeps of its run.
+        card: the graphics card that is to simulate; processors if None.
 
     Returns:
         The plan.
 
     Raises:
-        RequestError: if the task, values, a learner or an assistant is wrong.
+        RequestError: if the task, values, a learner or an assistant is wrong, or not for a card.
 
     Warns:
         ExpertWarning: if the values of a network are no better than random play.
@@ -103,17 +111,19 @@ def make_plan(experiment: Experiment, values: TabularValues | NetworkValues | No
             retention=experiment.retention,
             common_random_numbers=experiment.common_random_numbers,
         )
+        if card is not None:
+            check_for_card(condition)
         content = content_digest([experiment.seed, condition.content()]).hex()
         named.append((each, content))
         conditions[content] = condition
     if not task.states:
         check_expert(task, values)
     files: dict[str, np.ndarray] = {}
-    noted = _noted(task, named, conditions, files)
+    noted = _noted(made_by(task, card), task, named, conditions, files)
     record = noted._replace(
         task=task.digest(), values=values.digest(), discount=task.discount, starts=_starts(task)
     )
-    return Plan(experiment, task, values, named, conditions, record, files)
+    return Plan(experiment, task, values, named, conditions, record, files, card)
 
 
 def _starts(task: Task) -> list[int]:
@@ -124,6 +134,7 @@ def _starts(task: Task) -> list[int]:
 
 
 def _noted(
+    engine: dict[str, Any],
     task: Task,
     named: list[tuple[NamedCondition, str]],
     conditions: dict[str, Condition],
@@ -132,20 +143,19 @@ def _noted(
     """What is noted of conditions; their code is looked at here, once, by the one who asks.
 
     Args:
+        engine: what simulates them.
         task: what every condition is simulated at.
         named: the conditions, each with its content.
         conditions: the same by content.
         files: is filled with what is in the files that they name.
     """
-    engine = engine_of(task)
-    about = {"revision": engine.REVISION, "precision": engine.PRECISION}
     found: dict[Any, Identity] = {}
     noted: list[RecordedCondition] = []
     for each, content in named:
         rules, learner = tuple(each.assistant.chain), conditions[content].learner_type
         key = (*map(id, rules), id(learner))
         if key not in found:
-            found[key] = identity_of(each.assistant, learner, task, about)
+            found[key] = identity_of(each.assistant, learner, task, engine)
         read = {**each.assistant.files, **conditions[content].files}
         names = {name: file_name(numbers) for name, numbers in read.items()}
         files |= {names[name]: numbers for name, numbers in read.items()}
@@ -190,12 +200,32 @@ def estimated_seconds(plan: Plan, cells: Iterable[Cell]) -> dict[Cell, float]:
         alike = (condition.assistant.name, condition.learner_type.name)
         alike = alike if tabular else condition.learner
         if alike not in seconds:
-            measure = _seconds_a_trial if tabular else _seconds_a_deep_trial
-            seconds[alike] = measure(condition, plan.experiment.seed)
+            seconds[alike] = _measured(condition, plan)
         estimates[cell] = seconds[alike] * cell.trials
     if plan.experiment.tabular:
         return dict(sorted(estimates.items(), key=lambda item: -item[1]))
     return dict(sorted(estimates.items(), key=lambda item: item[0].first))
+
+
+def _measured(condition: Condition, plan: Plan) -> float:
+    """Seconds of a trial."""
+    seed = plan.experiment.seed
+    if plan.card is not None:
+        return _seconds_on_card(condition, seed, plan.card)
+    return (_seconds_a_trial if condition.task.states else _seconds_a_deep_trial)(condition, seed)
+
+
+def _seconds_on_card(condition: Condition, seed: int, card: Card) -> float:
+    """From the largest number of trials that take no longer than a single one."""
+    run_condition(condition, trials=1, seed=seed, card=card)
+    trials, before = 1, 0.0
+    while True:
+        begun = time.perf_counter()
+        run_condition(condition, trials=trials, seed=seed, card=card)
+        seconds = time.perf_counter() - begun
+        if trials == _MOST_ON_CARD or (before and seconds > 2 * before):
+            return seconds / trials
+        trials, before = min(16 * trials, _MOST_ON_CARD), seconds
 
 
 def _seconds_a_trial(condition: Condition, seed: int) -> float:

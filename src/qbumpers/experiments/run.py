@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 
 from qbumpers.experiments.cells import Cell, tiles
 from qbumpers.experiments.local import ThisMachine
+from qbumpers.experiments.on_card import GraphicsCard
 from qbumpers.experiments.plan import Plan, estimated_seconds
 from qbumpers.experiments.work import Finished
 from qbumpers.experiments.writing import open_store
@@ -24,6 +25,11 @@ class Backend(Protocol):
     def __call__(self, plan: Plan, seconds: dict[Cell, float]) -> Generator[Finished]:
         """Do the work of cells, given how long each will take, and yield each when finished."""
         ...
+
+
+def backend_of(plan: Plan) -> Backend:
+    """Where a plan is worked on if nothing else is said: its card, or all cores of this machine."""
+    return ThisMachine() if plan.card is None else GraphicsCard(plan.card)
 
 
 class RunProgress(NamedTuple):
@@ -58,14 +64,15 @@ def run_experiment(
     Args:
         plan: the experiment, made ready.
         folder: of the results; a killed run continues there.
-        backend: where to run; all cores of this machine if None.
+        backend: where to run; if None, the card that the plan is made for, or all cores of this
+            machine.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Raises:
         RequestError: if the folder holds another experiment, or another run is writing to it.
         StoreError: if results cannot be written; finished cells stay.
     """
-    backend = backend or ThisMachine()
+    backend = backend or backend_of(plan)
     design = plan.experiment
     with open_store(folder, design, plan.record) as store:
         store.write_inputs(plan.values, plan.files)

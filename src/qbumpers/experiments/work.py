@@ -39,6 +39,17 @@ def finish(condition: Condition, cell: Cell, seed: int) -> Finished:
         The cell with its tables, encoded.
     """
     simulation = run_condition(condition, trials=range(cell.first, cell.end), seed=seed)
+    return finished(condition, cell, simulation)
+
+
+def finished(condition: Condition, cell: Cell, simulation: Simulation) -> Finished:
+    """A cell with its tables.
+
+    Args:
+        condition: what the cell's content digest stands for.
+        cell: which trials.
+        simulation: what happened in them.
+    """
     tables = {EPISODES: episode_table(condition, cell, simulation)}
     if simulation.counts is not None:
         tables[STATES] = state_table(condition.task, simulation.counts)

@@ -10,7 +10,7 @@ import numpy as np
 
 from qbumpers.assistants.dispatch import decide, observe, undoes
 from qbumpers.assistants.dispatch import start as start_rule
-from qbumpers.borrowing import borrow, hold, row
+from qbumpers.borrowing import borrow, clear_scratch, hold, row
 from qbumpers.compilation import compiled, compiled_for_session, inlined, uncompiled
 from qbumpers.decisions import (
     Execution,
@@ -76,6 +76,33 @@ class LearnerStack(NamedTuple):
     practice: Practice | None
 
 
+class Minds(NamedTuple):
+    """What is remembered in a trial.
+
+    Attributes:
+        learner: the learner's memory.
+        fresh: that memory as it was at first; anything if nothing is forgotten.
+        rule: the rule's memory.
+    """
+
+    learner: Any
+    fresh: Any
+    rule: Any
+
+
+class TrialStreams(NamedTuple):
+    """The random streams of trials.
+
+    Attributes:
+        all: uint64 [T, 1, 4, 4] or, to begin anew in every episode, [T, E, 4, 4], see
+            `qbumpers.random_streams`.
+        own: uint64 [4, 4], those of the trial that runs; they change.
+    """
+
+    all: np.ndarray
+    own: np.ndarray
+
+
 class When(NamedTuple):
     """Which episode of which trial.
 
@@ -112,7 +139,8 @@ def _keep(record: Step | None, index: int, state: int, next_state: int, step: St
     record.probability[index] = step.probability
     record.coin[index] = step.coin
     record.tie[index] = step.tie
-    record.values[index] = step.values
+    for action in range(len(step.values)):
+        record.values[index, action] = step.values[action]
     record.projected_return[index] = step.projected_return
     record.reward[index] = step.reward
     record.next_state[index] = next_state
@@ -178,6 +206,7 @@ def _assisted_episode(
     account = begin(row(assistance.values, state, width), when.episode)
     total, overrides, events, length, last = 0.0, 0, 0, 0, -1
     while length < dynamics.episode_limit and not _is_over(sinks.script, recorded):
+        clear_scratch()
         proposed, noise = _propose(
             sinks.script, recorded, learner, memory, state, rates, last, dynamics.actions, streams
         )
@@ -190,7 +219,7 @@ def _assisted_episode(
             decision = decide(situation, noise, assistance.options, rule_memory)
             execution = execution_of(decision, undoes(decision), dynamics.actions)
         index = transition(dynamics, state, execution.executed, _chance(dynamics.outcomes, nature))
-        reward, event = dynamics.reward[index], int(dynamics.events[index])
+        reward, event = np.float64(dynamics.reward[index]), int(dynamics.events[index])
         next_state = dynamics.next_state[index]
         overridden = execution.executed != proposed or execution.undone
         experience = perceive(
@@ -258,11 +287,56 @@ def _greedy_episode(
 
 
 @inlined
-def _copy_streams(own: np.ndarray, streams: np.ndarray, trial: int, episode: int) -> None:
+def begin_streams(streams: TrialStreams, trial: int, episode: int) -> None:
     """Copy streams, number by number: copying slices takes Numba far longer to compile."""
-    for source in range(own.shape[0]):
-        for word in range(own.shape[1]):
-            own[source, word] = streams[trial, episode, source, word]
+    for source in range(streams.own.shape[0]):
+        for word in range(streams.own.shape[1]):
+            streams.own[source, word] = streams.all[trial, episode, source, word]
+
+
+@inlined
+def run_episodes(
+    dynamics: Dynamics, assistance: Assistance, learner: LearnerStack, minds: Minds,
+    streams: TrialStreams, trial: int, retention: int, sinks: Sinks, recorded: int,
+) -> int:  # fmt: skip
+    """The episodes of one trial, whose streams and memories have begun.
+
+    Args:
+        dynamics: what is to be learned.
+        assistance: what helps in it.
+        learner: what is simulated, with what lies around it.
+        minds: what is remembered.
+        streams: of the trial.
+        trial: place of the trial among the outcomes.
+        retention: R, episodes at the end without the assistant.
+        sinks: what is to be filled.
+        recorded: steps of training before this trial.
+
+    Returns:
+        The steps of training so far.
+    """
+    episodes = sinks.outcomes.assisted_return.shape[1]
+    training = episodes - retention
+    own = (
+        row(streams.own, LEARNER, _WORDS),
+        row(streams.own, ASSISTANT, _WORDS),
+        row(streams.own, ENVIRONMENT, _WORDS),
+        row(streams.own, EVALUATION, _WORDS),
+    )
+    memory, rule_memory = minds.learner, minds.rule
+    begin_practice(learner.practice)
+    for episode in range(episodes):
+        if episode > 0 and streams.all.shape[1] > 1:
+            begin_streams(streams, trial, episode)
+        when = When(trial, episode, episode < training)
+        if episode > 0:
+            forget_between(learner.forgetting, learner.practice, memory, minds.fresh)
+        rates = begin_learner(learner.settings, memory, episode, training)
+        rule_memory, recorded = _assisted_episode(
+            dynamics, assistance, learner, memory, rates, rule_memory, own, when, sinks, recorded
+        )
+        _greedy_episode(dynamics, learner, memory, own[EVALUATION], when, sinks)
+    return recorded
 
 
 @compiled
@@ -291,40 +365,23 @@ def run_trials(
         RequestError: if the rule or the learner chooses an action that there is not, or the rule
             gives a probability outside [0, 1].
     """
-    trials, episodes = sinks.outcomes.assisted_return.shape
-    training = episodes - retention
     shape = Shape(model.states, 0, assistance.width)
     dynamics, help_given, kept = borrow(model.dynamics), borrow(assistance), borrow(sinks)
     own = np.empty((4, 4), np.uint64)
-    borrowed = borrow(own)
-    own_streams = (
-        row(borrowed, 0, _WORDS),
-        row(borrowed, 1, _WORDS),
-        row(borrowed, 2, _WORDS),
-        row(borrowed, 3, _WORDS),
-    )
+    trial_streams = TrialStreams(streams, borrow(own))
     recorded = 0
-    for trial in range(trials):
-        _copy_streams(own, streams, trial, 0)
+    for trial in range(sinks.outcomes.assisted_return.shape[0]):
+        begin_streams(trial_streams, trial, 0)
+        stream = row(trial_streams.own, LEARNER, _WORDS)
         forgets = learner.forgetting, learner.practice
-        fresh = fresh_memory(forgets, learner.settings, shape, own_streams[LEARNER])
-        held = start_learner(learner.settings, shape, own_streams[LEARNER])
-        memory = borrow(held)
-        rule_memory = start_rule(assistance.options, model)
-        begin_practice(learner.practice)
-        for episode in range(episodes):
-            if episode > 0 and streams.shape[1] > 1:
-                _copy_streams(own, streams, trial, episode)
-            when = When(trial, episode, episode < training)
-            if episode > 0:
-                forget_between(learner.forgetting, learner.practice, memory, fresh)
-            rates = begin_learner(learner.settings, memory, episode, training)
-            rule_memory, recorded = _assisted_episode(
-                dynamics, help_given, learner, memory, rates, rule_memory, own_streams, when, kept,
-                recorded,
-            )  # fmt: skip
-            _greedy_episode(dynamics, learner, memory, own_streams[EVALUATION], when, kept)
+        fresh = fresh_memory(forgets, learner.settings, shape, stream)
+        held = start_learner(learner.settings, shape, stream)
+        minds = Minds(borrow(held), fresh, start_rule(assistance.options, model))
+        recorded = run_episodes(
+            dynamics, help_given, learner, minds, trial_streams, trial, retention, kept, recorded
+        )
         hold(held)
+    hold(own)
     return recorded
 
 

@@ -109,3 +109,13 @@ class Simulation(NamedTuple):
     def steps(self) -> int:
         """Steps that the learners took, assisted and unassisted."""
         return int(self.outcomes.assisted_length.sum() + self.outcomes.unassisted_length.sum())
+
+
+def joined(blocks: list[Simulation]) -> Simulation:
+    """Blocks of trials, one after another."""
+    outcomes = Outcomes(*map(np.concatenate, zip(*(b.outcomes for b in blocks), strict=True)))
+    counts = [block.counts for block in blocks if block.counts is not None]
+    if not counts:
+        return Simulation(outcomes, None)
+    sums = map(np.sum, zip(*counts, strict=True), (0, 0, 0))
+    return Simulation(outcomes, StateCounts(*sums))

@@ -64,15 +64,22 @@ def _call_loops(
             read_only(condition.values), read_only(condition.others), seen, condition.discount,
             assistant.numbers, (0,) * task.actions,
         ),
-        LearnerStack(*compiled_learner(condition), *_forgetting(condition)),
+        LearnerStack(*compiled_learner(condition), *forgetting_of(condition)),
         streams(condition, trials, seed),
         condition.retention,
         sinks,
     )  # fmt: skip
 
 
-def _forgetting(condition: Condition) -> tuple[float | None, Practice | None]:
-    """The share that is forgotten, and what is to be known of practice if that decides it."""
+def forgetting_of(condition: Condition) -> tuple[float | None, Practice | None]:
+    """The share that is forgotten, and what is to be known of practice if that decides it.
+
+    Args:
+        condition: of a task with a table.
+
+    Returns:
+        None for each way in which nothing is forgotten.
+    """
     forgetting, task = condition.forgetting, condition.task
     if isinstance(forgetting, PowerLaw):
         episodes = condition.episodes + condition.retention

@@ -1,18 +1,27 @@
 """Simulated learners at any task: `simulate`, and its parts for prepared conditions."""
 
+import importlib.metadata
 import itertools
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from typing import Protocol, Unpack
+from typing import Any, Protocol, Unpack
 
 import numpy as np
 
 from qbumpers.assistants import Assistant
-from qbumpers.compilation import compiling_together
+from qbumpers.compilation import compiles, compiling_together, shortened
 from qbumpers.decisions import Step
 from qbumpers.errors import RequestError, whole_number
 from qbumpers.simulation import deep, tabular
 from qbumpers.simulation.condition import Condition, Setup, make_condition
-from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
+from qbumpers.simulation.cuda.devices import (
+    PROCESSOR,
+    REVISION,
+    Card,
+    device_of,
+    why_not_compiled,
+)
+from qbumpers.simulation.outcomes import Script, Simulation, joined
 from qbumpers.simulation.workers import make_pool, some_finished
 from qbumpers.tasks import Task
 from qbumpers.tasks.registry import Named
@@ -25,6 +34,8 @@ def simulate(
     trials: int | range = 100,
     seed: int = 0,
     workers: int = 1,
+    device: str = PROCESSOR,
+    precision: str = "float64",
     **setup: Unpack[Setup],
 ) -> Simulation:
     """Simulate learners who learn a task with an assistant (Section 4.2).
@@ -40,23 +51,34 @@ def simulate(
         trials: how many, at least 1; or which.
         seed: decides, with the condition and the number of a trial, all chance; not negative.
         workers: threads, or processes if a task steps in Python.
+        device: "gpu" for a graphics card, "gpu:1" for the second one, if the task has a table.
+        precision: on a card, "float32" keeps tables, values and rewards in half the memory.
         **setup: `learner`, `perception`, `episodes` and others, see `Setup`.
 
     Returns:
         Outcomes by trial and episode, and counts by state.
 
     Raises:
-        RequestError: as `make_condition`, and for a number of trials below 1 or a negative seed.
+        RequestError: as `make_condition`, for a number of trials below 1 or a negative seed, and if
+            there is no such device or the condition cannot be simulated there.
     """
+    card = device_of(device, precision)
     condition = make_condition(task, assistant, **setup)
-    return run(condition, trials=trials, seed=seed, workers=workers)
+    return run(condition, trials=trials, seed=seed, workers=workers, card=card)
 
 
 def run(
-    condition: Condition, *, trials: int | range, seed: int = 0, workers: int = 1
+    condition: Condition,
+    *,
+    trials: int | range,
+    seed: int = 0,
+    workers: int = 1,
+    card: Card | None = None,
 ) -> Simulation:
-    """Simulate a condition; `simulate` says what the arguments mean."""
+    """Simulate a condition, on a card if one is given; `simulate` says what the others mean."""
     which = _checked_trials(trials, seed)
+    if card is not None:
+        return joined(list(run_on_card(condition, [which], seed, card)))
     workers = whole_number(workers, "workers", "from 1 up")
     if workers < 1:
         raise RequestError(f"workers = {workers!r}; at least 1 is needed")
@@ -71,7 +93,71 @@ def run(
             done, waiting = some_finished(waiting)
             for block in done:
                 block.result()  # raises at once what went wrong
-        return _joined([block.result() for block in blocks])
+        return joined([block.result() for block in blocks])
+
+
+def run_on_card(
+    condition: Condition, groups: Iterable[range], seed: int, card: Card
+) -> Iterator[Simulation]:
+    """Simulate groups of trials on a card, with counts of states for each group.
+
+    Args:
+        condition: what to simulate.
+        groups: which trials, ranges of step 1.
+        seed: the experiment's, for the random streams.
+        card: from `device_of`.
+
+    Yields:
+        What each group found, in their order.
+
+    Raises:
+        RequestError: what a rule or learner raises in a trial, and if one of them, or the task,
+            cannot be simulated on a card.
+    """
+    check_for_card(condition)
+    from qbumpers.simulation.cuda.engine import run_groups
+
+    with _compiling(condition, "on a GPU", why_not_compiled):
+        yield from run_groups(condition, groups, seed, card)
+
+
+def check_for_card(condition: Condition) -> None:
+    """Check what can be seen of a condition without compiling it.
+
+    Raises:
+        RequestError: if it cannot be simulated on a card.
+    """
+    assistant, learner = condition.assistant, condition.learner_type
+    if not condition.task.states:
+        raise RequestError(
+            f"task {condition.task.name}: on a GPU only tasks with a table are simulated"
+        )
+    plain = [f"assistant {rule.name}" for rule in assistant.chain if not rule.compiled]
+    plain += [] if learner.compiled else [f"learner {learner.name}"]
+    if plain and compiles():
+        raise RequestError(
+            f"{plain[0]}: it runs as plain Python, and on a GPU only compiled code does"
+        )
+
+
+def made_by(task: Task, card: Card | None) -> dict[str, Any]:
+    """What simulates a task, as it enters the identity of its results.
+
+    Args:
+        task: what is learned.
+        card: where; None for the processor.
+
+    Returns:
+        `revision` and `precision`; of a card also `gpu`, its own revision and compiler.
+    """
+    engine = engine_of(task)
+    if card is None:
+        return {"revision": engine.REVISION, "precision": engine.PRECISION}
+    return {
+        "revision": engine.REVISION,
+        "precision": card.precision,
+        "gpu": {"revision": REVISION, "numba-cuda": importlib.metadata.version("numba-cuda")},
+    }
 
 
 def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
@@ -79,9 +165,11 @@ def _run_block(condition: Condition, trials: range, seed: int) -> Simulation:
         return engine_of(condition.task).run_block(condition, trials, seed)
 
 
-def _compiling(condition: Condition) -> AbstractContextManager[None]:
-    what = f"assistant {condition.assistant.name}, learner {condition.learner_type.name}"
-    return compiling_together(what)
+def _compiling(
+    condition: Condition, where: str = "", reason: Callable[[BaseException], str] = shortened
+) -> AbstractContextManager[None]:
+    parts = [f"assistant {condition.assistant.name}", f"learner {condition.learner_type.name}"]
+    return compiling_together(", ".join([*parts, where] if where else parts), reason)
 
 
 class Engine(Protocol):
@@ -128,16 +216,6 @@ class Engine(Protocol):
 def engine_of(task: Task) -> Engine:
     """The engine for a task: by whether its states are numbered or observed as vectors."""
     return tabular if task.states else deep
-
-
-def _joined(blocks: list[Simulation]) -> Simulation:
-    """Blocks of trials, one after another."""
-    outcomes = Outcomes(*map(np.concatenate, zip(*(b.outcomes for b in blocks), strict=True)))
-    counts = [block.counts for block in blocks if block.counts is not None]
-    if not counts:
-        return Simulation(outcomes, None)
-    sums = map(np.sum, zip(*counts, strict=True), (0, 0, 0))
-    return Simulation(outcomes, StateCounts(*sums))
 
 
 def record(

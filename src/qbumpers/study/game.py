@@ -180,6 +180,8 @@ class Game:
     def _session_of(self, choice: Choice) -> Session:
         if choice.key not in self._sessions:
             name, options = choice.acting
+            if "name" in options:  # it would be taken for the rule's
+                raise RequestError(f"assistant {name}: unknown option 'name'")
             self._sessions[choice.key] = self.setup.session(make_assistant(name, **options))
         return self._sessions[choice.key]
 

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import sys
+import time
 from typing import Any
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -29,7 +30,7 @@ class PromptHTTP(H11Protocol):
     def connection_made(self, transport: Any) -> None:
         """See asyncio."""
         super().connection_made(transport)
-        self._began = self.loop.time()
+        self._began = time.monotonic()  # loops keep a time of their own, not that fine
         self._timers = [
             self.loop.call_later(REQUEST_WITHIN, self._end_if_idle),
             self.loop.call_later(LASTS, transport.abort),

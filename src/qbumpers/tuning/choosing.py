@@ -28,9 +28,8 @@ from qbumpers.analysis.statistics import CONFIDENCE, IntervalEstimate, mean_inte
 from qbumpers.assistants import Assistant
 from qbumpers.errors import RequestError
 from qbumpers.experiments.design import NamedCondition
-from qbumpers.experiments.local import ThisMachine
 from qbumpers.experiments.plan import Plan
-from qbumpers.experiments.run import Backend
+from qbumpers.experiments.run import Backend, backend_of
 from qbumpers.experiments.writing import open_store
 from qbumpers.files import open_folder
 from qbumpers.tuning.race import CHOSEN, UNCONFIRMED, Race, quiet
@@ -120,7 +119,8 @@ def tune(
         folder: of the results; tuning that was killed continues there.
         floor: assisted return that is needed, in reward units.
         confidence: that the choice is above the floor; the module says how it is meant.
-        backend: where to run; threads on all cores of this machine if None.
+        backend: where to run; if None, the card that the plan is made for, or all cores of this
+            machine.
         report: called with the progress at first and after each cell, from the calling thread.
 
     Returns:
@@ -134,7 +134,7 @@ def tune(
     _check(plan, floor, confidence)
     with quiet(), open_store(folder, plan.experiment, plan.record) as store:
         store.write_inputs(plan.values, plan.files)
-        trials = Trials(plan, store, backend or ThisMachine(), report)
+        trials = Trials(plan, store, backend or backend_of(plan), report)
         verdicts, confidences = _decide(trials, floor, confidence)
         contenders = [
             _contender(trials, named, content, verdicts[content], confidences[content])

@@ -1,0 +1,179 @@
+"""Learner steps per second on a graphics card, against all cores and against a plain kernel.
+
+The rate of a card is that of its kernel alone, and beside it that of `simulate` as a whole, which
+also draws seeds and brings every episode's outcomes back.
+"""
+
+import time
+from typing import Any
+
+import numpy as np
+from measuring import Row, Target, Timed, alternate, compared, is_quick, show
+
+from qbumpers.assistants import make_assistant
+from qbumpers.cores import usable_cores
+from qbumpers.errors import RequestError
+from qbumpers.learners import make_learner
+from qbumpers.simulation import Card, Condition, device_of, make_condition, run
+
+UNIT = "M steps/s"
+TASKS = {"cliff-walking": 0.0, "taxi": -20.0, "frozen-lake": 0.0}
+"""With a return that bumpers may let an episode fall to."""
+
+SHARES = {"float32": 0.5, "float64": 0.2}
+"""Of the plain kernel's rate that the package is to reach with bumpers at Cliff Walking."""
+
+_TRIALS, _HERE = 1 << 17, 2_000  # on a card, on the cores of this machine
+_FULL = (_TRIALS, 100, 3)  # trials, episodes, rounds
+_QUICK = (8, 1, 1)
+_STANDARD_ERRORS = 4
+
+
+def conditions(task: str, episodes: int) -> dict[str, Condition]:
+    """No assistant, bumpers, bumpers with SARSA, and the rule with the most to remember."""
+    floor = TASKS[task]
+    bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, v_min=floor)
+    heaviest = make_assistant("learner-aware-bumpers", alpha=0.7, v_min=floor)
+    q_learning, sarsa = make_learner("q-learning"), make_learner("sarsa")
+    return {
+        name: make_condition(task, assistant, learner=learner, episodes=episodes)
+        for name, assistant, learner in (
+            ("none", make_assistant("none"), q_learning),
+            ("bumpers", bumpers, q_learning),
+            ("bumpers, SARSA", bumpers, sarsa),
+            ("learner-aware", heaviest, q_learning),
+        )
+    }
+
+
+def whole(condition: Condition, trials: int, card: Card) -> Timed:
+    """Million steps per second of `simulate` on a card."""
+    run(condition, trials=trials, card=card)
+
+    def timed(seed: int) -> float:
+        begin = time.perf_counter()
+        simulation = run(condition, trials=trials, seed=seed, card=card)
+        return simulation.steps / (time.perf_counter() - begin) / 1e6
+
+    return timed
+
+
+def kernel(condition: Condition, trials: int, card: Card) -> Timed:
+    """Million steps per second of a kernel alone."""
+    from qbumpers.simulation.cuda import card as cards
+    from qbumpers.simulation.cuda.block import begin
+    from qbumpers.simulation.cuda.engine import kernel_arguments
+
+    begun = begin(condition, card.precision, recorded=False)
+
+    def launched(trials: int, seed: int) -> tuple[Any, float]:
+        with cards.chosen(card):
+            arguments: Any = kernel_arguments(
+                condition, begun, [range(trials)], seed, cards.own_arrays, cards.empty_array
+            )
+            started = time.perf_counter()
+            *_, sinks, _ = cards.launch(begun.space, arguments, trials)
+            seconds = time.perf_counter() - started
+            return cards.returned(sinks.outcomes), seconds
+
+    launched(1, 0)  # compiles
+
+    def timed(seed: int) -> float:
+        outcomes, seconds = launched(trials, seed)
+        steps = outcomes.assisted_length.sum() + outcomes.unassisted_length.sum()
+        return float(steps) / seconds / 1e6
+
+    return timed
+
+
+def here(condition: Condition, trials: int) -> Timed:
+    """Million steps per second of all cores of this machine."""
+    run(condition, trials=1)
+
+    def timed(seed: int) -> float:
+        begin = time.perf_counter()
+        simulation = run(condition, trials=trials, seed=seed, workers=usable_cores())
+        return simulation.steps / (time.perf_counter() - begin) / 1e6
+
+    return timed
+
+
+def against_cores(task: str, quick: bool, number: int) -> list[Row]:
+    """A card against all cores, in both precisions."""
+    rows = []
+    trials, episodes, rounds = _QUICK if quick else _FULL
+    for name, condition in conditions(task, episodes).items():
+        if quick and name == "learner-aware":
+            continue
+        timed = {"cores": here(condition, min(trials, _HERE))}
+        for precision in SHARES:
+            card = Card(number, precision)  # type: ignore[arg-type]
+            timed[f"kernel, {precision}"] = kernel(condition, trials, card)
+            timed[f"simulate, {precision}"] = whole(condition, trials, card)
+        rates = alternate(timed, rounds)
+        cores = rates.pop("cores")
+        rows += [
+            compared(f"{task}, {name}, {what}", rate, UNIT, "all cores", cores)
+            for what, rate in rates.items()
+        ]
+    return rows
+
+
+def against_plain_kernel(quick: bool, number: int) -> list[Row]:
+    """Bumpers at Cliff Walking against a kernel written by hand for them."""
+    import plain_gpu
+
+    trials, episodes, rounds = _QUICK if quick else _FULL
+    rows = []
+    bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
+    condition = make_condition("cliff-walking", bumpers, episodes=episodes)
+    for precision, share in SHARES.items():
+        found = plain_gpu.run(trials, episodes, 0.7, precision)
+        _check_agreement(found, condition, trials, Card(number, precision))  # type: ignore[arg-type]
+
+        def plain(_: int, kind: str = precision) -> float:
+            one = plain_gpu.run(trials, episodes, 0.7, kind)
+            return one.steps / one.seconds / 1e6
+
+        ours = kernel(condition, trials, Card(number, precision))  # type: ignore[arg-type]
+        rates = alternate({"ours": ours, "plain": plain}, rounds)
+        target = Target(share * float(np.median(rates["plain"])), at_least=True)
+        rows.append(
+            compared(
+                f"bumpers, {precision}", rates["ours"], UNIT, "plain kernel", rates["plain"], target
+            )
+        )
+    return rows
+
+
+def _check_agreement(found: Any, condition: Condition, trials: int, card: Card) -> None:
+    outcomes = run(condition, trials=trials, card=card).outcomes
+    pairs = {
+        "assisted": (found.assisted, outcomes.assisted_return),
+        "unassisted": (found.unassisted, outcomes.unassisted_return),
+    }
+    for which, (theirs, ours) in pairs.items():
+        own = ours.mean(axis=1)
+        error = np.sqrt((own.var() + theirs.var()) / trials)
+        if abs(own.mean() - theirs.mean()) > _STANDARD_ERRORS * error:
+            raise RuntimeError(
+                f"{which}: the package finds {own.mean():.2f}, the plain kernel "
+                f"{theirs.mean():.2f}: they do not measure the same learner"
+            )
+
+
+def measure(quick: bool) -> list[Row]:
+    """Every row of this benchmark; none, with a sentence, if there is no card."""
+    try:
+        card = device_of("gpu")
+    except RequestError as error:
+        print(f"Skipped: {error}")
+        return []
+    number = card.number if card else 0
+    tasks = list(TASKS)[:1] if quick else list(TASKS)
+    rows = against_plain_kernel(quick, number)
+    return rows + [row for task in tasks for row in against_cores(task, quick, number)]
+
+
+if __name__ == "__main__":
+    show("On a graphics card", measure(is_quick(__doc__)))

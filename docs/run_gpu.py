@@ -1,0 +1,167 @@
+"""Measure a graphics card: `python docs/run_gpu.py [PART ...]`, some minutes on a large card.
+
+Three parts: `agreement`, in how many of 10,000 trials a step is another one than on the processor,
+and whether means agree; `benchmark`, benchmarks/gpu.py; `map`, the hypervolume of bumpers over
+`v_min` and `p_max`, with all alphas in it, at a hundred thousand learners per point. Numbers are
+kept in docs/data/gpu, the map in docs/images/gpu-map.png. `--quick` shows that it runs, with a
+simulated card too.
+"""
+
+import argparse
+import importlib
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from qbumpers import make_assistant, make_task, simulate, solve
+from qbumpers.analysis.hypervolume import hypervolume
+from qbumpers.simulation import Card, device_of, make_condition
+
+FOLDER = Path(__file__).parent
+SEED = 17
+ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+FLOORS = (-400.0, -200.0, -100.0, -50.0, 0.0, 40.0)
+SURE = (0.6, 0.8, 0.9, 0.99, 0.999, 0.9999)
+
+
+class Size(NamedTuple):
+    """How much is simulated.
+
+    Attributes:
+        agreement: trials that are compared step by step.
+        learners: per point of the map.
+        episodes: of a trial.
+        alphas: of the map.
+        floors: values of `v_min`.
+        sure: values of `p_max`.
+    """
+
+    agreement: int = 10_000
+    learners: int = 100_000
+    episodes: int = 100
+    alphas: tuple[float, ...] = ALPHAS
+    floors: tuple[float, ...] = FLOORS
+    sure: tuple[float, ...] = SURE
+
+
+QUICK = Size(2, 4, 2, (0.2, 0.8), (0.0,), (0.9, 0.999))
+
+
+def agreement(size: Size, card: Card) -> dict[str, Any]:
+    """How many trials part, and the means of both."""
+    from qbumpers.simulation.cuda.agreement import agreement as compared
+
+    bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
+    condition = make_condition("cliff-walking", bumpers, episodes=min(size.episodes, 20))
+    found = {"steps": compared(condition, size.agreement, SEED, card)._asdict()}
+    print(f"{found['steps']['parted']} of {found['steps']['trials']} trials part")
+    for precision, device in (("float64", "processor"), ("float64", "gpu"), ("float32", "gpu")):
+        outcomes = simulate(
+            "cliff-walking", bumpers, trials=size.agreement, seed=SEED, device=device,
+            precision=precision, episodes=size.episodes,
+        ).outcomes  # fmt: skip
+        for name in ("assisted_return", "unassisted_return"):
+            means = getattr(outcomes, name).mean(axis=1)
+            error = means.std() / len(means) ** 0.5
+            found[f"{device} {precision} {name}"] = {"mean": means.mean(), "error": error}
+            print(f"{device}, {precision}, {name}: {means.mean():.3f} +- {error:.3f}")
+    return found
+
+
+def benchmark(quick: bool) -> dict[str, Any]:
+    """The rows of benchmarks/gpu.py."""
+    sys.path.insert(0, str(FOLDER.parent / "benchmarks"))
+    gpu, measuring = importlib.import_module("gpu"), importlib.import_module("measuring")
+    rows = gpu.measure(quick)
+    measuring.show("On a graphics card", rows)
+    return {"rows": [{**row._asdict(), "ratios": list(row.ratios)} for row in rows]}
+
+
+def map_of_bumpers(size: Size) -> dict[str, Any]:
+    """Normalised hypervolume of bumpers for each `v_min` and `p_max`, over all alphas."""
+    task = make_task("cliff-walking")
+    best = float(solve(task)(int(np.flatnonzero(task.start)[0])).max())
+    reference = np.array([_point(size, "none", {})[0], _point(size, "maximal", {})[1]])
+    begin = time.perf_counter()
+    points = {
+        (floor, sure): [
+            _point(size, "stochastic-q-bumpers", {"alpha": alpha, "v_min": floor, "p_max": sure})
+            for alpha in size.alphas
+        ]
+        for floor in size.floors
+        for sure in size.sure
+    }
+    seconds = time.perf_counter() - begin
+    box = float(np.prod(best - reference))
+    shares = [
+        [float(hypervolume(np.array(points[floor, sure]), reference)) / box for sure in size.sure]
+        for floor in size.floors
+    ]
+    print(f"{len(points) * len(size.alphas)} points of {size.learners} learners: {seconds:.1f} s")
+    _draw(size, np.array(shares))
+    return {"shares": shares, "seconds": seconds, "points": len(points) * len(size.alphas)}
+
+
+def _point(size: Size, name: str, options: dict[str, float]) -> tuple[float, float]:
+    outcomes = simulate(
+        "cliff-walking", make_assistant(name, **options), trials=size.learners, seed=SEED,
+        device="gpu", episodes=size.episodes,
+    ).outcomes  # fmt: skip
+    return float(outcomes.assisted_return.mean()), float(outcomes.unassisted_return.mean())
+
+
+def _draw(size: Size, shares: np.ndarray) -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+    image = axes.imshow(shares, origin="lower", aspect="auto", cmap="viridis")
+    axes.set_xticks(range(len(size.sure)), [f"{sure:g}" for sure in size.sure])
+    axes.set_yticks(range(len(size.floors)), [f"{floor:g}" for floor in size.floors])
+    axes.set_xlabel("p_max")
+    axes.set_ylabel("v_min")
+    figure.colorbar(image, label="share of the box that the alphas cover")
+    figure.savefig(_folder(size) / "images" / "gpu-map.png", dpi=150)
+    plt.close(figure)
+
+
+def _folder(size: Size) -> Path:
+    """A quick run leaves the documentation alone."""
+    place = FOLDER.parent / "results" / "gpu-quick" if size == QUICK else FOLDER
+    (place / "images").mkdir(parents=True, exist_ok=True)
+    return place
+
+
+def main() -> None:
+    """Measure, print, and keep the numbers."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    parts = ("agreement", "benchmark", "map")
+    arguments.add_argument("parts", nargs="*", metavar="PART", help=", ".join(parts))
+    arguments.add_argument("--quick", action="store_true", help="small, to see that it runs")
+    given = arguments.parse_args()
+    for part in given.parts:
+        if part not in parts:
+            arguments.error(f"PART = {part!r}; one of {', '.join(parts)} is needed")
+    card = device_of("gpu")
+    assert card is not None
+    size = QUICK if given.quick else Size()
+    work = {
+        "agreement": lambda: agreement(size, card),
+        "benchmark": lambda: benchmark(given.quick),
+        "map": lambda: map_of_bumpers(size),
+    }
+    folder = _folder(size) / "data" / "gpu"
+    folder.mkdir(parents=True, exist_ok=True)
+    for part in given.parts or parts:
+        found = work[part]()
+        (folder / f"{part}.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
