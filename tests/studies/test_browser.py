@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -272,7 +273,10 @@ def test_simulated_learners_take_part_in_the_browser(tmp_path):
     )  # fmt: skip
     path, setups = tmp_path / "simulated.sqlite", setups_of(study)
     engine = open_study(path, study.name, "simulated", "digest")
-    found = rehearse(study, setups, engine, 2, take_part=by_browser, at_once=1)
+    with ThreadPoolExecutor(1) as pool:  # the browser of other tests has this thread's loop
+        found = pool.submit(
+            rehearse, study, setups, engine, 2, take_part=by_browser, at_once=1
+        ).result()
     assert found.outcomes == {"complete": 2}
     engine = open_study(path, study.name, "simulated", "digest")
     for participant in read_participants(engine, study):
