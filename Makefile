@@ -23,7 +23,7 @@ test-slow: $(VENV)/installed-dev  ## Run the longer checks
 test-study: $(VENV)/installed-dev  ## Play in a real browser, and record in PostgreSQL
 	.ci/install_browser
 	.ci/install_postgresql
-	$(BIN)/pytest -m study tests/study
+	$(BIN)/pytest -m study tests/study tests/studies
 
 soak: $(VENV)/installed-dev  ## Play for 30 minutes while connections, servers and the database fail
 	.ci/install_postgresql

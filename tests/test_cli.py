@@ -24,7 +24,7 @@ def test_help_names_every_command_and_what_it_does(call, flag):
         "reproduce Repeat an experiment of the paper",
         "run Run an experiment of your own",
         "play Play a task in the browser, with an assistant",
-        "study Look after what was played",
+        "study Studies with participants",
         "tune Find the assistant that teaches best",
         "report Write tables, figures and report.html",
         "list List what experiments can name",

@@ -37,7 +37,7 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 
 _NEVER_COMPILED = {
     "analysis", "cli", "conformance.py", "experiments", "files.py", "reproduction", "session.py",
-    "shared_control.py", "source", "tuning",
+    "shared_control.py", "source", "studies", "study", "tuning",
 }  # fmt: skip
 
 

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from qbumpers.experiments.participants import Exported
     from qbumpers.study.replaying import Replayed
 
-study = typer.Typer(help="Look after what was played in the browser.", no_args_is_help=True)
+study = typer.Typer(
+    help="Studies with participants, and what was played in the browser.", no_args_is_help=True
+)
 application.add_typer(study, name="study")
 
 _RECORDS = "play.sqlite"  # in the folder of --out
@@ -29,6 +31,23 @@ Records = Annotated[
     str,
     typer.Argument(
         help="What play recorded: a file, or the URL of a PostgreSQL database.", metavar="RECORDS"
+    ),
+]
+Host = Annotated[
+    str,
+    typer.Option(
+        help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
+        metavar="ADDRESS",
+    ),
+]
+Certificate = Annotated[Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")]
+Key = Annotated[Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")]
+BehindProxy = Annotated[
+    str | None,
+    typer.Option(
+        help="Where a proxy serves it: https://study.example.org",
+        metavar="URL",
+        show_default=False,
     ),
 ]
 Alpha = Annotated[
@@ -67,28 +86,11 @@ def play(
     alpha: Alpha = None,
     values: Values = None,
     discount: Discount = None,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
-            metavar="ADDRESS",
-        ),
-    ] = "127.0.0.1",
+    host: Host = "127.0.0.1",
     port: Port = 8765,
-    certificate: Annotated[
-        Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")
-    ] = None,
-    key: Annotated[
-        Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")
-    ] = None,
-    behind_proxy: Annotated[
-        str | None,
-        typer.Option(
-            help="Where a proxy serves it: https://study.example.org",
-            metavar="URL",
-            show_default=False,
-        ),
-    ] = None,
+    certificate: Certificate = None,
+    key: Key = None,
+    behind_proxy: BehindProxy = None,
     browser: Browser = True,
     out: Annotated[
         Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
@@ -109,7 +111,7 @@ def play(
 
     Example: qbumpers play lunar-lander --assistant stochastic-q-bumpers --alpha 0.7
     """
-    _check_installed()
+    check_installed()
     import_modules(imports or (), "--import")
     from qbumpers.study.addresses import Address
     from qbumpers.study.game import Choice
@@ -189,7 +191,7 @@ def replay_records(
 
     Example: qbumpers study replay results/play/play.sqlite
     """
-    _check_installed()
+    check_installed()
     import_modules(imports or (), "--import")
     from qbumpers.study.replaying import replay_file
     from qbumpers.study.running import show
@@ -220,18 +222,34 @@ def _announce_replay(url: str) -> None:
 
 @study.command("export")
 def export(
-    records: Records,
+    records: Annotated[
+        str,
+        typer.Argument(help="What play recorded, or a study file.", metavar="RECORDS|STUDY.toml"),
+    ],
     out: Annotated[Path, typer.Option(help="Folder for the files.", metavar="DIR")],
+    mode: Annotated[
+        str, typer.Option(help="Of a study: live, pilot or simulated.", metavar="MODE")
+    ] = "live",
+    folder: Annotated[
+        Path | None,
+        typer.Option(help="Of a study's records.", show_default="results/NAME", metavar="DIR"),
+    ] = None,
     imports: Imports = None,
 ) -> None:
     """Write what was played as an experiment's files, a participant in the place of a trial.
 
-    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them.
+    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them. A study is also written as a
+    Psych-DS data set.
 
     Example: qbumpers study export results/play/play.sqlite --out results/played
     """
-    _check_installed()
+    check_installed()
     import_modules(imports or (), "--import")
+    if records.endswith(".toml"):
+        from qbumpers.cli.studies import export_data
+
+        export_data(Path(records), out, mode, folder)
+        return
     from qbumpers.experiments.participants import STEPS, export_records
 
     for found in export_records(records, out):
@@ -262,7 +280,8 @@ def _unfinished(found: "Exported") -> Iterator[str]:
         yield f"{counted(found.idle, 'session')} without a step."
 
 
-def _check_installed() -> None:
+def check_installed() -> None:
+    """Check that the extra `study` is installed; RequestError naming what is missing if not."""
     try:
         import itsdangerous as itsdangerous
         import msgspec as msgspec

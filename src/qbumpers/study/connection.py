@@ -2,12 +2,13 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from qbumpers.errors import RequestError
-from qbumpers.study.messages import Message, decoded, encoded
+from qbumpers.study.messages import decoded, encoded
 
 TAKEN_OVER, TOO_MUCH, WRONG, UNKNOWN_SESSION, NOT_KEPT, FAILED = range(4001, 4007)
 """Codes with which a socket is closed: another page took over; too many or too long messages; no
@@ -33,10 +34,17 @@ class Connection:
 
     Args:
         socket: accepted.
+        decode: reads a message, see `qbumpers.study.messages.decoded_by`.
+        per_second: messages that the page may send for long.
     """
 
-    def __init__(self, socket: WebSocket) -> None:
-        self._socket = socket
+    def __init__(
+        self,
+        socket: WebSocket,
+        decode: Callable[[str | bytes], Any] = decoded,
+        per_second: float = MESSAGES_PER_SECOND,
+    ) -> None:
+        self._socket, self._decode, self._per_second = socket, decode, per_second
         self._allowance, self._counted = _AT_ONCE, time.monotonic()
 
     async def send(self, kind: str, **fields: Any) -> None:
@@ -51,7 +59,7 @@ class Connection:
         except (WebSocketDisconnect, RuntimeError, OSError, TimeoutError) as error:
             raise GoneError from error
 
-    async def receive(self) -> Message:
+    async def receive(self) -> Any:
         """The next message.
 
         Raises:
@@ -65,7 +73,7 @@ class Connection:
         text = found.get("text")
         if text is None:
             raise RequestError("message: bytes; a JSON text is needed")
-        return decoded(text)
+        return self._decode(text)
 
     async def close(self, code: int, reason: str) -> None:
         """Say why, and close; a page that has gone is no matter."""
@@ -81,12 +89,12 @@ class Connection:
     def _count(self) -> None:
         """TooMuchError if messages come faster than they may."""
         now = time.monotonic()
-        more = (now - self._counted) * MESSAGES_PER_SECOND
+        more = (now - self._counted) * self._per_second
         self._allowance = min(_AT_ONCE, self._allowance + more) - 1
         self._counted = now
         if self._allowance < 0:
             raise TooMuchError(
-                f"more than {MESSAGES_PER_SECOND:.0f} messages per second; the page may send fewer"
+                f"more than {self._per_second:.0f} messages per second; the page may send fewer"
             )
 
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -31,12 +31,19 @@ class Choice(NamedTuple):
     @property
     def acting(self) -> tuple[str, dict[str, Any]]:
         """Name and options of the rule that decides: the one that never overrides if unassisted."""
-        return (self.name, dict(self.options)) if self.assisted else ("none", {})
+        if not self.assisted:
+            return "none", {}
+        # JSON has no tuples, and options have no lists.
+        return self.name, {option: _tupled(value) for option, value in self.options.items()}
 
     @property
     def key(self) -> str:
         """The same for the same assistant, whatever the order of its options."""
         return json.dumps(self.acting, sort_keys=True)
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(cast(list[Any], value)) if isinstance(value, list) else value
 
 
 class Episode(NamedTuple):
@@ -144,7 +151,7 @@ class Game:
         state, reward, events = self._stepper.step(decision.action)
         if decision.undo:
             self._stepper.restore(before)
-        if self.episodes[-1].length + 1 >= self.setup.task.episode_limit:
+        if self.episodes[-1].length + 1 >= self.setup.limit:
             events |= LIMIT
         step = self.session.record(reward, self.setup.seen(state), events)
         self.state = self.state if decision.undo else state

@@ -1,5 +1,6 @@
 """What the page and the server say to each other: JSON texts, strictly checked on arrival."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -125,23 +126,34 @@ class Focus(_Message, tag="focus"):
 
 
 Message = Hello | Begin | Act | Hold | Pause | Continue | Speed | Focus
-_decoder = msgspec.json.Decoder(Message)
 _encoder = msgspec.json.Encoder()
 
 
-def decoded(text: str | bytes) -> Message:
-    """A message of a page.
+def decoded_by(kinds: Any) -> Callable[[str | bytes], Any]:
+    """A function that reads messages of a page.
 
-    Raises:
-        RequestError: if it is too long, is no JSON, or has a field that is unknown, missing or out
-            of range.
+    Args:
+        kinds: a union of Structs, the messages that there are.
+
+    Returns:
+        From a JSON text to a message. It raises RequestError if the text is too long, is no JSON,
+        or has a field that is unknown, missing or out of range.
     """
-    if len(text) > MOST_BYTES:
-        raise RequestError(f"message of {len(text)} bytes; at most {MOST_BYTES} are taken")
-    try:
-        return _decoder.decode(text)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise RequestError(f"message: {error}") from error
+    decoder = msgspec.json.Decoder(kinds)
+
+    def decode(text: str | bytes) -> Any:
+        if len(text) > MOST_BYTES:
+            raise RequestError(f"message of {len(text)} bytes; at most {MOST_BYTES} are taken")
+        try:
+            return decoder.decode(text)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise RequestError(f"message: {error}") from error
+
+    return decode
+
+
+decoded: Callable[[str | bytes], Message] = decoded_by(Message)
+"""A message of a page of play."""
 
 
 def encoded(kind: str, **fields: Any) -> str:

@@ -67,6 +67,7 @@ class Player:
         game: as far as the record goes.
         writer: of the records.
         second: how long a second of the countdown takes.
+        with_view: whether the page is sent what the assistant sees.
 
     Attributes:
         tenure: see above; it has the session's identifier.
@@ -74,11 +75,20 @@ class Player:
         lost: whether the game went wrong, so that the record alone knows the state.
     """
 
-    def __init__(self, tenure: Tenure, game: Game, writer: Writer, second: float = 1.0) -> None:
+    def __init__(
+        self,
+        tenure: Tenure,
+        game: Game,
+        writer: Writer,
+        second: float = 1.0,
+        *,
+        with_view: bool = True,
+    ) -> None:
         self.tenure = tenure
         self.connection: Connection | None = None
         self.lost = False
         self._game, self._writer, self._second = game, writer, second
+        self._with_view = with_view
         self._display = game.setup.display
         self._stepping = asyncio.Lock()
         self._clock: asyncio.Task[None] | None = None
@@ -107,7 +117,7 @@ class Player:
                 share=self._share,
             )
             if game.episodes:
-                await connection.send("state", **state_view(game))
+                await connection.send("state", **state_view(game, with_view=self._with_view))
         self._start_clock()
 
     async def take_over(self, connection: Connection) -> None:
@@ -248,7 +258,8 @@ class Player:
     async def _show(self) -> None:
         game = self._game
         turns = self._display.rate == 0
-        with_view = turns or not game.episodes[-1].length % _VIEW_EVERY or not game.playing
+        due = turns or not game.episodes[-1].length % _VIEW_EVERY or not game.playing
+        with_view = self._with_view and due
         await self._send("state", **state_view(game, with_view=with_view))
 
     async def _send(self, kind: str, **fields: Any) -> None:

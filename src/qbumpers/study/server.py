@@ -5,7 +5,8 @@ import contextlib
 import logging
 import secrets
 import time
-from collections.abc import AsyncGenerator, Collection, Generator
+from abc import ABC, abstractmethod
+from collections.abc import AsyncGenerator, Collection, Generator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from sqlalchemy.exc import OperationalError
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import FileResponse
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
@@ -67,35 +68,16 @@ class UnknownSessionError(RequestError):
     """A token of no session that can go on here."""
 
 
-class Sessions:
-    """The sessions that are being played, and those of the record.
+class Entrance(ABC):
+    """Whose pages a server serves: those of play, or of a study. It counts its pages."""
 
-    Args:
-        setup: what is played.
-        choice: who assists unless the participant chooses.
-        engine: of the records.
-        second: how long a second of the countdown takes.
-    """
-
-    def __init__(
-        self, setup: Setup, choice: Choice, engine: sql.Engine, second: float = 1.0
-    ) -> None:
-        self._setup, self._engine, self._second = setup, engine, second
-        self._writer = Writer(engine)
-        self._signer = URLSafeSerializer(secret_of(engine), salt="session")
-        self._players: dict[str, Player] = {}
-        self._finding = asyncio.Lock()
+    def __init__(self) -> None:
         self._open = 0
         self._silent: list[asyncio.Timeout] = []
-        self._facts: dict[str, Any] = {
-            "task": task_view(setup),
-            "offers": offers(setup),
-            "choice": {
-                "assistant": choice.name,
-                "options": dict(choice.options),
-                "assisted": choice.assisted,
-            },
-        }
+
+    def connection(self, socket: WebSocket) -> Any:
+        """A page at the other end of a socket."""
+        return Connection(socket)
 
     async def greeted(self, connection: Connection) -> Hello:
         """What a page says first.
@@ -132,6 +114,52 @@ class Sessions:
             yield
         finally:
             self._open -= 1
+
+    @abstractmethod
+    async def join(self, connection: Any, hello: Any, /) -> Any:
+        """Whose page it is that has greeted; something that handles messages."""
+
+    @abstractmethod
+    async def welcome(self, player: Any, connection: Any, hello: Any, /) -> None:
+        """Show a page where they are."""
+
+    @abstractmethod
+    async def leave(self, player: Any, connection: Any, /) -> None:
+        """A page has gone."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Write what is waiting."""
+
+
+class Sessions(Entrance):
+    """The sessions that are being played, and those of the record.
+
+    Args:
+        setup: what is played.
+        choice: who assists unless the participant chooses.
+        engine: of the records.
+        second: how long a second of the countdown takes.
+    """
+
+    def __init__(
+        self, setup: Setup, choice: Choice, engine: sql.Engine, second: float = 1.0
+    ) -> None:
+        super().__init__()
+        self._setup, self._engine, self._second = setup, engine, second
+        self._writer = Writer(engine)
+        self._signer = URLSafeSerializer(secret_of(engine), salt="session")
+        self._players: dict[str, Player] = {}
+        self._finding = asyncio.Lock()
+        self._facts: dict[str, Any] = {
+            "task": task_view(setup),
+            "offers": offers(setup),
+            "choice": {
+                "assistant": choice.name,
+                "options": dict(choice.options),
+                "assisted": choice.assisted,
+            },
+        }
 
     async def join(self, connection: Connection, hello: Hello) -> Player:
         """The session of a page that has greeted; it is that page's from now on.
@@ -213,7 +241,7 @@ class Sessions:
         return player
 
 
-async def _converse(sessions: Sessions, connection: Connection) -> None:
+async def _converse(sessions: Entrance, connection: Connection) -> None:
     """Everything that a page says, until it goes."""
     try:
         hello = await sessions.greeted(connection)
@@ -236,7 +264,7 @@ async def _converse(sessions: Sessions, connection: Connection) -> None:
         await connection.close(1011, "the server failed; what happened before is kept")
 
 
-async def _play(sessions: Sessions, connection: Connection, hello: Hello) -> None:
+async def _play(sessions: Entrance, connection: Connection, hello: Hello) -> None:
     """What a page says once it has greeted."""
     player = await sessions.join(connection, hello)
     try:
@@ -252,30 +280,39 @@ async def _play(sessions: Sessions, connection: Connection, hello: Hello) -> Non
         await sessions.leave(player, connection)
 
 
-def make_application(sessions: Sessions, hosts: Collection[str], scheme: str = "http") -> Any:
+def make_application(
+    sessions: Entrance,
+    hosts: Collection[str],
+    scheme: str = "http",
+    file: str = "index.html",
+    routes: Sequence[BaseRoute] = (),
+) -> Any:
     """The server as an ASGI application.
 
     Args:
         sessions: that are played on it; closed when it ends.
         hosts: names with ports by which pages may address it.
         scheme: "http" or "https", of the pages.
+        file: name of its page in `STATIC`.
+        routes: further ones.
     """
 
     async def page(_: Request) -> FileResponse:
-        return FileResponse(STATIC / "index.html")
+        return FileResponse(STATIC / file)
 
     async def socket(websocket: WebSocket) -> None:
         await websocket.accept()
-        await _converse(sessions, Connection(websocket))
+        await _converse(sessions, sessions.connection(websocket))
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
         yield
         await asyncio.to_thread(sessions.close)
 
-    routes = [
+    everywhere = [
         Route("/", page),
         WebSocketRoute("/socket", socket),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), hosts, scheme)
+    application = Starlette(routes=[*everywhere, *routes], lifespan=lifespan)
+    return Guard(application, hosts, scheme)

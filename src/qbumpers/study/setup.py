@@ -28,11 +28,13 @@ class Setup:
     Args:
         name: of the task, as `make_task` takes it.
         values: path of a values file; Q* is solved, or the shipped expert's, if None.
+        step_limit: steps after which an episode ends at the latest; the task's own limit if None.
         **arguments: of `make_task`, JSON-like; None is left out.
 
     Attributes:
         task: what is played.
         display: how it is shown.
+        limit: steps after which an episode ends.
         model: what a rule may know of it.
         values: gives Q* with further rows, by a tuple of their names; made when they are asked for.
         description: what it was made of, JSON-like, and the digests that its records hang on.
@@ -41,10 +43,17 @@ class Setup:
         RequestError: if there is no such task, it cannot be shown, or its values are not known.
     """
 
-    def __init__(self, name: str, values: str | Path | None = None, **arguments: Any) -> None:
+    def __init__(
+        self,
+        name: str,
+        values: str | Path | None = None,
+        step_limit: int | None = None,
+        **arguments: Any,
+    ) -> None:
         given = {field: value for field, value in arguments.items() if value is not None}
         self.task: Task = make_task(name, **given)
         self.display = _display_of(self.task)
+        self.limit = min(step_limit or self.task.episode_limit, self.task.episode_limit)
         self.model = _model_of(self.task)
         self._source = None if values is None else str(values)
         self.values = functools.cache(self._values_with)
@@ -56,6 +65,8 @@ class Setup:
             "revision": self.task.revision,
             "values digest": self.values(()).digest(),
         }
+        if step_limit is not None:
+            self.description["step limit"] = step_limit
 
     def session(self, assistant: Assistant) -> Session:
         """A session of an assistant at the task, before its first episode.
@@ -150,4 +161,5 @@ def setup_of(description: Mapping[str, Any]) -> Setup:
     Raises:
         RequestError: as `Setup`.
     """
-    return Setup(description["task"], description["values"], **description["arguments"])
+    limit = description.get("step limit")
+    return Setup(description["task"], description["values"], limit, **description["arguments"])

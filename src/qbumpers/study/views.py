@@ -23,7 +23,7 @@ def task_view(setup: Setup) -> dict[str, Any]:
         "rate": display.rate,
         "idle": display.idle,
         "backdrop": list(display.backdrop),
-        "limit": setup.task.episode_limit,
+        "limit": setup.limit,
     }
 
 

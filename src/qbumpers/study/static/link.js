@@ -18,6 +18,11 @@ export class Link {
     } catch { /* without storage, a reload begins a new session */ }
   }
 
+  // Whether this browser has been here before.
+  get known() {
+    return this.#token !== "";
+  }
+
   open() {
     const socket = new WebSocket(`ws${location.protocol === "https:" ? "s" : ""}://${location.host}/socket`);
     this.#socket = socket;

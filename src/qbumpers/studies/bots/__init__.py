@@ -1,0 +1,1 @@
+"""Simulated learners who take part in a study as people do."""

@@ -1,0 +1,1 @@
+"""What comes of a study: its data for everybody, flags, estimates, power, and what is owed."""

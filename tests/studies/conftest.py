@@ -1,0 +1,6 @@
+"""Without the extra `study`, there are no studies."""
+
+from tests.study.conftest import MISSING
+
+if MISSING:
+    collect_ignore_glob = ["test_*.py", "*/test_*.py"]
