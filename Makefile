@@ -23,11 +23,11 @@ test-slow: $(VENV)/installed-dev  ## Run the longer checks
 test-study: $(VENV)/installed-dev  ## Play in a real browser, and record in PostgreSQL
 	.ci/install_browser
 	.ci/install_postgresql
-	$(BIN)/pytest -m study tests/study tests/studies
+	$(BIN)/pytest -m study tests/play tests/study
 
 soak: $(VENV)/installed-dev  ## Play for 30 minutes while connections, servers and the database fail
 	.ci/install_postgresql
-	$(BIN)/python -m tests.study.soak --minutes 30
+	$(BIN)/python -m tests.play.soak --minutes 30
 
 # In an environment of their own: the compiler for cards needs an older NumPy.
 test-gpu-compile: $(GPU_VENV)/installed  ## Compile for a graphics card, and simulate one: needs none

@@ -105,12 +105,12 @@ def main() -> None:
 
 def serve(task: str, records: str) -> None:
     """A server without countdowns, until it is terminated."""
-    from qbumpers.study.addresses import listening_at
-    from qbumpers.study.game import Choice
-    from qbumpers.study.running import serve_until_stopped
-    from qbumpers.study.server import Sessions, make_application
-    from qbumpers.study.setup import Setup
-    from qbumpers.study.tables import open_records
+    from qbumpers.play.addresses import listening_at
+    from qbumpers.play.game import Choice
+    from qbumpers.play.running import serve_until_stopped
+    from qbumpers.play.server import Sessions, make_application
+    from qbumpers.play.setup import Setup
+    from qbumpers.play.tables import open_records
 
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     listening = listening_at(0)

@@ -44,12 +44,12 @@ def test_help_names_every_command_and_what_it_does(call, flag):
         ),
         (
             "run",
-            ["EXPERIMENT.toml", "--workers N", "--on ADDRESS", "--out DIR", "--yes",
+            ["EXPERIMENT.toml", "--workers N", "--on gpu|ADDRESS", "--out DIR", "--yes",
              "Example: qbumpers run"],
         ),
         (
             "tune",
-            ["EXPERIMENT.toml", "--floor RETURN", "--confidence SHARE", "--on ADDRESS",
+            ["EXPERIMENT.toml", "--floor RETURN", "--confidence SHARE", "--on gpu|ADDRESS",
              "default: 0.95", "Example: qbumpers tune"],
         ),
         (

@@ -41,7 +41,7 @@ RUN_LANGUAGES = (*RUNNING, "toml", "text")
 OTHERS = "docs/third-party.md"  # needs packages that this one does not
 INTERNAL = ("borrowing", "cli", "compilation", "errors", "files", "kept_code", "source")
 INTERNAL_PREFIXES = tuple(f"qbumpers.{name}." for name in INTERNAL)
-SERVING = {"play"}  # goes on until it is stopped: tests/study runs it
+SERVING = {"play"}  # goes on until it is stopped: tests/play runs it
 CITED_HOSTS = {"doi.org", "arxiv.org"}
 EXAMPLE_HOSTS = {"127.0.0.1", "lab.example.org", "study.example.org"}
 

@@ -36,8 +36,8 @@ INLINE: Any = {"forceinline": True, **_SETTINGS}
 
 
 _NEVER_COMPILED = {
-    "analysis", "cli", "conformance.py", "experiments", "files.py", "reproduction", "session.py",
-    "shared_control.py", "source", "studies", "study", "tuning",
+    "analysis", "cli", "conformance.py", "experiments", "files.py", "play", "reproduction",
+    "session.py", "shared_control.py", "source", "study", "tuning",
 }  # fmt: skip
 
 

@@ -14,9 +14,9 @@ from qbumpers.analysis.report import write_report
 from qbumpers.errors import RequestError
 from qbumpers.experiments.participants import export_records
 from qbumpers.experiments.steps import load_steps
-from qbumpers.study.game import Choice, Game
-from qbumpers.study.setup import Setup
-from qbumpers.study.tables import (
+from qbumpers.play.game import Choice, Game
+from qbumpers.play.setup import Setup
+from qbumpers.play.tables import (
     EPISODES,
     NOTES,
     SESSIONS,
@@ -26,7 +26,7 @@ from qbumpers.study.tables import (
     open_records,
     step_row,
 )
-from qbumpers.study.writing import Writer
+from qbumpers.play.writing import Writer
 
 AROUND = [0, *[1] * 11, 2]
 HELPED = Choice("stochastic-q-bumpers", {"alpha": 0.5})

@@ -1,342 +1,288 @@
-"""The page in a real browser: keys, touch, gamepad, reloads, a killed server, accessibility."""
+"""The example study in a real browser, from consent to completion, at both sizes."""
 
-import time
+import os
+import re
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
-from qbumpers.study.game import Choice
-from qbumpers.study.tables import open_records, read_session, sessions_in
 from tests.narrowing import present
-from tests.study.browsing import AXE, WIDTHS, violations
-from tests.study.serving import process, served
 
 pytestmark = pytest.mark.study
 
-KEYS = ["ArrowUp", *["KeyD"] * 11, "ArrowDown"]
-"""Around the cliff."""
-MINUS_13 = "\N{MINUS SIGN}13"
-SINCE = "step => Number(document.getElementById('step').textContent) >= step"
-ALONE = Choice("stochastic-q-bumpers", {"alpha": 0.5}, assisted=False)
+ROOT = Path(__file__).parents[2]
+AXE = ROOT / ".browser" / "node_modules" / "axe-core" / "axe.min.js"
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"]
+SIZES = {"desktop": (1280, 860), "phone": (390, 844)}
+TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+DONE = "https://example.org/done"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    found = shutil.which("chromium")
+    if found is None:
+        pytest.skip("chromium is not installed: .ci/install_browser")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture
-def records(tmp_path):
-    return tmp_path / "play.sqlite"
+def open_page(browser):
+    """Opens pages; whatever goes wrong in one is an error of the test."""
+    wrong, contexts = [], []
+
+    def open_page(device="desktop", scheme="light"):
+        width, height = SIZES[device]
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme,
+            has_touch=device == "phone", reduced_motion="reduce",
+        )  # fmt: skip
+        context.route(f"{DONE}**", lambda route: route.fulfill(body="<title>back</title>"))
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(15_000)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    # A server that is gone is what some tests are about; a wrong token is refused.
+    assert [text for text in wrong if "ERR_CONNECTION" not in text and "403" not in text] == []
+
+
+class Server:
+    """`qbumpers study serve` in a process of its own, at a port that stays."""
+
+    def __init__(self, file, out):
+        self._arguments, self._port = [str(file), "--out", str(out)], "0"
+        self.start()
+
+    def start(self):
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "qbumpers", "study", "serve", *self._arguments, "--no-browser",
+             "--port", self._port],
+            stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )  # fmt: skip
+        output = present(self._process.stdout)
+        found = re.search(r"http://(127\.0\.0\.1:(\d+))/", output.readline())
+        assert found, "it does not say where it serves"
+        self.address, self._port = found[1], found[2]
+        self.token = output.readline().split()[-1]
+
+    def kill(self):
+        self._process.kill()
+        self._process.wait(15)
+        present(self._process.stdout).close()
 
 
 @pytest.fixture
-def cliff_server(cliff, records):
-    with served(cliff, ALONE, records, second=0.2) as address:
-        yield address
+def example(tmp_path):
+    """The example study, shortened, with a link to go back to."""
+    text = (ROOT / "examples" / "study.toml").read_text(encoding="utf-8")
+    for before, now in [
+        ("step_limit = 60", "step_limit = 4"),
+        ("episodes = 8 ", "episodes = 2 "),
+        ("# codes = {", f'return_link = "{DONE}?cc={{code}}"\ncodes = {{'),
+    ]:
+        assert before in text
+        text = text.replace(before, now)
+    path = tmp_path / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 @pytest.fixture
-def lander_server(lander, records):
-    with served(lander, Choice("none", {}), records, second=0.2) as address:
-        yield address
+def server(example, tmp_path):
+    running = Server(example, tmp_path / "records")
+    yield running
+    running.kill()
 
 
-def rows_of(records):
-    """Columns of every recorded step that `Step` does not have."""
-    import sqlalchemy as sql
-
-    from qbumpers.study.tables import STEPS
-
-    engine = open_records(records)
-    with engine.connect() as connection:
-        rows = connection.execute(sql.select(STEPS).order_by(STEPS.c.number)).mappings().all()
-    engine.dispose()
-    return rows
+def violations(page):
+    if not AXE.is_file():
+        return []
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("tags => axe.run({runOnly: tags})", TAGS)
+    return [(each["id"], [n["target"] for n in each["nodes"]]) for each in found["violations"]]
 
 
-def played(records):
-    engine = open_records(records)
-    [session] = [read_session(engine, each) for each in sessions_in(engine)]
-    engine.dispose()
-    return present(session).played
-
-
-def begin(page):
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-
-
-def walk(page, keys=KEYS):
-    """Press keys as a person does, each when the one before is seen."""
-    first = int(page.inner_text("#step"))
-    for k, key in enumerate(keys):
-        page.keyboard.press(key)
-        expect_step(page, first + k + 1)
-
-
-def expect_step(page, step):
+def heading(page, text):
     page.wait_for_function(
-        "step => document.getElementById('step').textContent === String(step)", arg=step
+        "text => document.getElementById('heading').textContent === text", arg=text
     )
+    assert violations(page) == [], text
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), text
 
 
-def test_the_cliff_is_walked_by_keys(cliff_server, records, opened):
-    page = opened(cliff_server)
-    assert page.inner_text("#task") == "cliff-walking"
-    begin(page)
-    assert "row 4 of 4, column 1 of 12" in page.inner_text("#words").lower()
-    blank = page.locator("#canvas").screenshot()
-    walk(page)
-    page.wait_for_selector("#go:visible")
-    assert page.inner_text("#headline") == "You made it"
-    assert page.inner_text("#return") == "87"
-    assert page.locator("#canvas").screenshot() != blank
-    assert page.evaluate("() => document.activeElement.id") == "go"
-    page.click("#episodes summary")
-    assert page.inner_text("#rows").split() == ["1", "none", "87", "13", "0", "success"]
-    assert page.inner_text("#progress") == "1 unassisted, mean return 87, best 87."
-    rows = rows_of(records)
-    assert {row["device"] for row in rows} == {"keyboard"}
-    for row in rows:
-        assert row["shown"] < row["pressed"]
-        assert row["received"] <= row["applied"]
-    page.focus("#go")
-    page.keyboard.press("Enter")
-    page.wait_for_selector("#overlay", state="hidden")
-    assert page.inner_text("#episode") == "2"
+def go(page):
+    page.click("#form button.primary")
 
 
-def test_a_key_that_is_held_is_one_press(cliff_server, opened):
-    page = opened(cliff_server)
-    begin(page)
-    for _ in range(5):
-        page.keyboard.down("ArrowUp")  # after the first, repeats
-    expect_step(page, 1)
-    page.keyboard.up("ArrowUp")
-    walk(page, ["ArrowUp"])
-    assert page.inner_text("#step") == "2"
+def play(page, device, after=None):
+    """Play episodes until the block is over; after(step) is called between."""
+    while True:
+        page.click("#choices button.primary")
+        if not page.evaluate("document.getElementById('game').offsetParent"):
+            return  # the next page is there
+        page.wait_for_selector("#overlay", state="hidden")
+        before = page.inner_text("#episode")
+        for step in range(4):
+            if device == "phone":
+                page.tap("#pad .up")
+            else:
+                page.keyboard.press("ArrowUp")
+            page.wait_for_function(
+                "step => Number(document.getElementById('step').textContent) >= step", arg=step + 1
+            )
+            if after and step == 1:
+                after()
+                after = None
+        page.wait_for_selector("#choices button.primary:visible")
+        assert violations(page) == []
+        if "over" in page.inner_text("#detail"):
+            page.click("#choices button.primary")
+            return
+        assert page.inner_text("#episode") == before
 
 
-def test_what_the_assistant_sees_and_does_is_shown(cliff_server, opened):
-    page = opened(cliff_server)
-    page.select_option("#assistant", "maximal")
-    page.check("#assisted")
-    begin(page)
-    sees = page.inner_text("#view").split()
-    assert sees[sees.index("up") : sees.index("up") + 4] == ["up", "87", "87", "0"]
-    assert sees[sees.index("right") : sees.index("right") + 4] == [
-        "right",
-        MINUS_13,
-        MINUS_13,
-        "100",
-    ]
-    assert "up" in page.inner_text("#view .best")
-    walk(page, ["ArrowRight"])
-    page.wait_for_selector("#override:visible")
-    assert page.inner_text("#override") == "Assistant: up instead of your right"
-    assert page.inner_text(".log") == "step 1: up instead of your right"
-    assert "up instead of your right" in page.inner_text("#words")
-
-
-def test_the_assistant_changes_between_episodes(cliff_server, records, opened):
-    page = opened(cliff_server)
-    begin(page)
-    page.check("#assisted")
-    page.fill("input[name=alpha]", "0.25")
-    page.keyboard.press("ArrowUp")  # the form has the focus, not the game
-    page.fill("input[name=alpha]", "0.25")
-    page.click("#canvas")
-    walk(page)
-    page.wait_for_selector("#go:visible")
-    begin(page)
-    walk(page, ["ArrowUp"])
-    first, second = played(records)
-    assert (first.choice.assisted, second.choice.assisted) == (False, True)
-    assert second.choice.options["alpha"] == 0.25
-
-
-def test_a_wrong_option_is_explained_on_the_page(cliff_server, opened):
-    page = opened(cliff_server)
-    page.check("#assisted")
-    page.click(".options summary")
-    page.fill("input[name=v_min]", "500")
-    page.click("#go")
+@pytest.mark.parametrize(("device", "scheme"), [("desktop", "light"), ("phone", "dark")])
+def test_the_example_from_consent_to_the_way_back(server, open_page, device, scheme):
+    page = open_page(device, scheme)
+    page.goto(f"http://{server.address}/")
+    heading(page, "Consent")
+    assert page.is_hidden("#withdraw")
+    go(page)
+    heading(page, "Instructions")
+    go(page)
+    heading(page, "Checking your device")
+    page.wait_for_selector("#form button")
+    go(page)
+    heading(page, "Practice")
+    play(page, device)
+    heading(page, "Before you begin")
+    go(page)
+    assert page.locator(".wrong:visible").count() == 2
+    page.get_by_label("nothing").check()
+    page.get_by_label("no", exact=True).check()
+    go(page)
     page.wait_for_selector("#notice:visible")
-    assert "v_min = 500 must be below the value of the start state" in page.inner_text("#notice")
-    page.fill("input[name=v_min]", "0")
-    begin(page)
-    assert page.is_hidden("#notice")
+    page.get_by_label("100 points").check()
+    page.get_by_label("no", exact=True).check()
+    go(page)
+    heading(page, "First round")
+    play(page, device)
+    heading(page, "Training")
 
-
-def test_the_lander_is_flown_in_real_time(lander_server, records, opened):
-    page = opened(lander_server)
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    page.keyboard.down("ArrowUp")
-    page.wait_for_function(SINCE, arg=31)
-    page.keyboard.up("ArrowUp")
-    page.click("#pause")
-    page.wait_for_selector("#go:visible")
-    stopped = page.inner_text("#step")
-    time.sleep(0.4)
-    assert page.inner_text("#step") == stopped
-    assert page.inner_text("#pause") == "Go on"
-    page.click("#half")
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    began, first = time.monotonic(), int(page.inner_text("#step"))
-    page.wait_for_function(SINCE, arg=first + 20)
-    assert time.monotonic() - began > 0.6  # at 25 Hz
-    rows = rows_of(records)
-    fired = [row for row in rows if row["proposed"] == 2]
-    assert len(fired) > 10
-    assert {row["device"] for row in fired} == {"keyboard"}
-    assert len({row["pressed"] for row in fired}) == 1
-    assert [row["number"] for row in rows] == list(range(len(rows)))
-
-
-def test_keys_are_released_when_the_page_loses_the_focus(lander_server, opened):
-    page = opened(lander_server)
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    page.keyboard.down("ArrowLeft")
-    page.wait_for_selector("#pad .pressed")
-    page.evaluate("window.dispatchEvent(new Event('blur'))")
-    page.wait_for_selector("#pad .pressed", state="detached")
-    page.wait_for_selector("#go:visible")
-    assert "the page is not in front" in page.inner_text("#detail")
-
-
-def test_fingers_play_on_a_phone(cliff_server, records, opened):
-    page = opened(cliff_server, "phone")
-    page.tap("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    for k, name in enumerate(["up", "right", "right"]):
-        page.tap(f"#pad .{name}")
-        expect_step(page, k + 1)
-    assert {row["device"] for row in rows_of(records)} == {"touch"}
-    for button in page.query_selector_all("button:visible"):
-        box = present(button.bounding_box())
-        assert min(box["width"], box["height"]) >= 44
-
-
-GAMEPAD = """
-window.pressed = [];
-navigator.getGamepads = () => [{
-  axes: [0, 0],
-  buttons: Array.from({length: 17}, (_, number) => ({pressed: window.pressed.includes(number)})),
-}];
-"""
-
-
-def test_a_gamepad_plays(cliff_server, records, opened):
-    page = opened(cliff_server, before=GAMEPAD)
-    begin(page)
-    for step, button in [(1, 12), (2, 15)]:
-        page.evaluate(f"window.pressed = [{button}]")
-        expect_step(page, step)
-        page.evaluate("window.pressed = []")
-        page.wait_for_selector("#pad .pressed", state="detached")
-    rows = rows_of(records)
-    assert [(row["device"], row["proposed"]) for row in rows] == [("gamepad", 0), ("gamepad", 1)]
-
-
-def test_a_gamepad_flies_the_lander(lander_server, records, opened):
-    page = opened(lander_server, before=GAMEPAD)
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    page.evaluate("window.pressed = [12]")
-    page.wait_for_function(SINCE, arg=20)
-    page.evaluate("window.pressed = []")
-    page.wait_for_selector("#pad .pressed", state="detached")
-    page.click("#pause")
-    page.wait_for_selector("#go:visible")
-    rows = [row for row in rows_of(records) if row["device"] == "gamepad"]
-    assert len(rows) > 5
-    assert {row["proposed"] for row in rows} <= {0, 2}
-    assert 2 in {row["proposed"] for row in rows}
-
-
-def test_the_keys_are_said_before_the_first_episode(lander_server, opened):
-    page = opened(lander_server)
-    assert "Keys: ← left, ↑ main, → right, ↓ nothing." in page.inner_text("#detail")
-
-
-def test_a_reload_goes_on_in_mid_episode(cliff_server, opened):
-    page = opened(cliff_server)
-    begin(page)
-    walk(page, KEYS[:6])
-    page.reload()
-    expect_step(page, 6)
-    page.wait_for_selector("#overlay", state="hidden")
-    walk(page, KEYS[6:])
-    page.wait_for_selector("#go:visible")
-    assert page.inner_text("#return") == "87"
-
-
-def test_the_page_survives_a_killed_server(tmp_path, opened):
-    out = tmp_path / "records"
-    arguments = ["cliff-walking", "--assistant", "maximal", "--out", str(out)]
-    with process(*arguments) as server:
-        page = opened(server.address)
-        begin(page)
-        walk(page, KEYS[:4])
+    def killed():
         server.kill()
         page.wait_for_selector("#overlay:visible")
-        assert page.inner_text("#headline") == "Connection lost"
-        page.keyboard.press("ArrowUp")  # not lost in the dark: nothing is played meanwhile
         server.start()
         page.wait_for_selector("#overlay", state="hidden", timeout=20_000)
-        expect_step(page, 4)
-        walk(page, KEYS[4:])
-        page.wait_for_selector("#go:visible")
-    assert [len(episode.steps) for episode in played(out / "play.sqlite")] == [13]
+        page.wait_for_function("() => document.getElementById('step').textContent === '2'")
+
+    play(page, device, after=killed)
+    heading(page, "Final round")
+    page.reload()
+    heading(page, "Final round")
+    play(page, device)
+    heading(page, "Some questions")
+    for slider in page.get_by_role("slider").all():
+        slider.press("ArrowRight")
+    go(page)
+    heading(page, "About you")
+    page.get_by_label("sometimes").check()
+    go(page)
+    heading(page, "Thank you")
+    go(page)
+    heading(page, "The study is complete")
+    assert page.inner_text(".code") == "Your code: C1"
+    page.click("a.button")
+    page.wait_for_url(f"{DONE}?cc=C1")
 
 
-def test_a_second_tab_takes_over_and_the_first_says_so(cliff_server, opened, open_in):
-    first = opened(cliff_server)
-    begin(first)
-    walk(first, KEYS[:3])
-    second = open_in(first.context, cliff_server)
-    expect_step(second, 3)
-    first.wait_for_selector("#go:visible")
-    assert first.inner_text("#headline") == "Played elsewhere"
-    walk(second, KEYS[3:4])
-    first.bring_to_front()
-    first.click("#go")
-    expect_step(first, 4)
+def test_withdrawing_is_asked_twice_and_deletes(server, open_page, tmp_path):
+    page = open_page()
+    page.goto(f"http://{server.address}/")
+    go(page)
+    heading(page, "Instructions")
+    page.click("#withdraw")
+    assert violations(page) == []
+    page.click("#stay")
+    page.click("#withdraw")
+    page.click("#leave")
+    heading(page, "The study has ended")
+    assert "Your data were deleted" in page.inner_text("#text")
+    page.reload()
+    heading(page, "Consent")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("device", WIDTHS)
-def test_the_page_is_accessible_and_fits(cliff_server, opened, device, scheme):
-    if not AXE.is_file():
-        pytest.skip("axe-core is not installed: .ci/install_browser")
-    page = opened(cliff_server, device, scheme, reduced_motion="reduce")
+@pytest.mark.parametrize("device", SIZES)
+def test_the_researcher_sees_who_is_where(server, open_page, device, scheme):
+    participant, page = open_page(), open_page(device, scheme)
+    participant.goto(f"http://{server.address}/")
+    go(participant)
+    heading(participant, "Instructions")
+    page.goto(f"http://{server.address}/researcher")
     assert violations(page) == []
-    page.select_option("#assistant", "maximal")
-    page.check("#assisted")
-    begin(page)
-    walk(page, ["ArrowRight"])
-    assert violations(page) == []
-    walk(page, KEYS[1:])
-    page.wait_for_selector("#go:visible")
-    page.click("#episodes summary")
+    page.fill("#token", "guess")
+    page.click("#form button")
+    page.wait_for_function(
+        "() => document.getElementById('link').textContent.startsWith('Not opened')"
+    )
+    page.fill("#token", server.token)
+    page.click("#form button")
+    page.wait_for_selector("#people tbody tr")
+    assert "1 came, 1 are here now" in page.inner_text("#summary")
+    assert "instructions" in page.inner_text("#people")
     assert violations(page) == []
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    assert page.get_attribute("#words", "aria-live") == "polite"
+    assert server.token not in page.url
+    with page.expect_download() as download:
+        page.click("#export")
+    assert download.value.suggested_filename == "study.zip"
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("device", WIDTHS)
-def test_pictures_of_the_page_have_the_colours_of_its_scheme(
-    lander_server, opened, tmp_path, device, scheme
-):
-    from PIL import Image
+def test_simulated_learners_take_part_in_the_browser(tmp_path):
+    if shutil.which("chromium") is None:
+        pytest.skip("chromium is not installed: .ci/install_browser")
+    pytest.importorskip("playwright.async_api")
+    from qbumpers.study.bots.browser import by_browser
+    from qbumpers.study.bots.rehearsing import rehearse
+    from qbumpers.study.design.sources import setups_of
+    from qbumpers.study.flow.tables import open_study
+    from qbumpers.study.outcomes.reading import read_participants
+    from tests.study.flow.studies import CHECK, block, study_of
 
-    page = opened(lander_server, device, scheme)
-    page.click("#go")
-    page.wait_for_selector("#overlay", state="hidden")
-    page.click("#pause")
-    page.wait_for_selector("#go:visible")
-    page.screenshot(path=tmp_path / "page.png")
-    with Image.open(tmp_path / "page.png") as picture:
-        assert picture.width == WIDTHS[device]
-        corner = picture.convert("L").getpixel((2, picture.height - 2))
-    assert isinstance(corner, int)
-    assert (corner > 200) == (scheme == "light")
+    study = study_of(
+        {"kind": "device-check"}, CHECK, block("training", 1, probe_every=1, attribution=3),
+        {"kind": "questionnaire", "instrument": "nasa-tlx"},
+        {"kind": "questionnaire", "instrument": "trust"},
+        {"kind": "questionnaire", "instrument": "background"},
+        rehearsal={"drop_out": 0.0, "reload": 1.0},
+    )  # fmt: skip
+    path, setups = tmp_path / "simulated.sqlite", setups_of(study)
+    engine = open_study(path, study.name, "simulated", "digest")
+    with ThreadPoolExecutor(1) as pool:  # the browser of other tests has this thread's loop
+        found = pool.submit(
+            rehearse, study, setups, engine, 2, take_part=by_browser, at_once=1
+        ).result()
+    assert found.outcomes == {"complete": 2}
+    engine = open_study(path, study.name, "simulated", "digest")
+    for participant in read_participants(engine, study):
+        assert [episode.length for episode in participant.blocks[0].episodes] == [4, 4]
+        assert {step["device"] for step in participant.blocks[0].times} == {"keyboard"}
+        answers = participant.answers()
+        assert answers["nasa-tlx"].content["content"]["effort"] % 5 == 0
+        assert answers["device-check"].content["content"]["refresh"] > 0
+    engine.dispose()

@@ -6,7 +6,7 @@ from qbumpers.cli import experiments as experiments
 from qbumpers.cli import expert as expert
 from qbumpers.cli import fitting as fitting
 from qbumpers.cli import listing as listing
-from qbumpers.cli import studies as studies
+from qbumpers.cli import play as play
 from qbumpers.cli import study as study
 from qbumpers.cli import tuning as tuning
 from qbumpers.cli.application import application, main

@@ -1,293 +1,388 @@
-"""`qbumpers play` and `qbumpers study`."""
+"""Commands of `qbumpers study` for studies with participants."""
 
-import contextlib
-import tomllib
-from collections.abc import Iterator, Sequence
+import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from qbumpers.cli.application import application
 from qbumpers.cli.console import OUTPUT
-from qbumpers.cli.working import Imports
+from qbumpers.cli.play import (
+    BehindProxy,
+    Browser,
+    Certificate,
+    Host,
+    Key,
+    Port,
+    check_installed,
+    study,
+)
 from qbumpers.errors import RequestError, counted
-from qbumpers.imports import import_modules
 
 if TYPE_CHECKING:
-    from qbumpers.experiments.participants import Exported
-    from qbumpers.study.replaying import Replayed
+    from qbumpers.study.design.models import Study
 
-study = typer.Typer(
-    help="Studies with participants, and what was played in the browser.", no_args_is_help=True
-)
-application.add_typer(study, name="study")
+File = Annotated[Path, typer.Argument(help="The study file.", metavar="STUDY.toml")]
 
-_RECORDS = "play.sqlite"  # in the folder of --out
-_DEFAULT = ("stochastic-q-bumpers", {"alpha": 0.5})
 
-Records = Annotated[
-    str,
-    typer.Argument(
-        help="What play recorded: a file, or the URL of a PostgreSQL database.", metavar="RECORDS"
-    ),
-]
-Host = Annotated[
-    str,
-    typer.Option(
-        help="Where to listen; elsewhere than on loopback only with TLS or behind a proxy.",
-        metavar="ADDRESS",
-    ),
-]
-Certificate = Annotated[Path | None, typer.Option(help="For TLS, in PEM.", metavar="FILE")]
-Key = Annotated[Path | None, typer.Option(help="Of the certificate, in PEM.", metavar="FILE")]
-BehindProxy = Annotated[
-    str | None,
-    typer.Option(
-        help="Where a proxy serves it: https://study.example.org",
-        metavar="URL",
-        show_default=False,
-    ),
-]
-Alpha = Annotated[
-    float | None,
-    typer.Option(help="How much the assistant leaves to you.", metavar="SHARE"),
-]
-Values = Annotated[
+def _say(text: str) -> None:
+    OUTPUT.print(escape(text), soft_wrap=True)
+
+
+@study.command("new")
+def new_study(file: File) -> None:
+    """Write a study file to begin with, with comments.
+
+    Example: qbumpers study new my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.sources import write_new
+
+    write_new(file)
+    _say(f"{file} is written: change it, then: qbumpers study check {file}")
+
+
+@study.command("check")
+def check_study(file: File) -> None:
+    """Check a study file, and say what it comes to.
+
+    Example: qbumpers study check my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.sources import check_playable, load_study
+
+    design = load_study(file)
+    check_playable(design)
+    for line in _described(design):
+        _say(line)
+    _warn_of_identities(file, design)
+    _say("OK")
+
+
+def _warn_of_identities(file: Path, design: "Study") -> None:
+    if datetime.datetime.now(datetime.UTC).date() > design.keep_identities_until:
+        _say(
+            f"Identities were to be kept until {design.keep_identities_until}: delete them, by "
+            f"qbumpers study forget {file} --identities"
+        )
+
+
+def _described(design: "Study") -> list[str]:
+    """What a study comes to, a line each."""
+    from qbumpers.study.design.parts import Block, Sitting
+
+    conditions = [condition.name for condition in design.all_conditions()]
+    blocks = [
+        f"{part.id} ({counted(len(part.plan()), 'episode')})"
+        for part in design.parts
+        if isinstance(part, Block)
+    ]
+    sittings = 1 + sum(isinstance(part, Sitting) for part in design.parts)
+    return [
+        f"{design.name}: {design.title}",
+        f"parts: {', '.join(part.id for part in design.parts)}",
+        f"sittings: {sittings}; blocks: {', '.join(blocks)}",
+        f"{counted(len(conditions), 'condition')}: {', '.join(conditions)}",
+        f"{counted(len(design.orders()), 'order')} of parts",
+    ]
+
+
+Folder = Annotated[
     Path | None,
     typer.Option(
-        help="Q* of the assistant.",
-        show_default="solved, or the shipped expert's",
-        metavar="FILE",
+        "--out", help="Folder of the records.", show_default="results/NAME", metavar="DIR"
     ),
 ]
-Port = Annotated[int, typer.Option(help="0 for any that is free.", metavar="N")]
-Browser = Annotated[bool, typer.Option(help="Open the page in the browser.")]
-Discount = Annotated[
-    float | None, typer.Option(help="Of a Gymnasium environment, which has none.", metavar="NUMBER")
+Live = Annotated[
+    bool, typer.Option("--live", help="The live records, of the study as it was frozen.")
 ]
 
 
-@application.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
-def play(
-    context: typer.Context,
-    task: Annotated[
-        str, typer.Argument(help="Name of a task, or of a Gymnasium environment.", metavar="TASK")
-    ],
-    assistant: Annotated[
-        str | None,
-        typer.Option(
-            help="Who assists; the page can change it.",
-            show_default="stochastic-q-bumpers with alpha = 0.5",
-            metavar="NAME",
-        ),
-    ] = None,
-    alpha: Alpha = None,
-    values: Values = None,
-    discount: Discount = None,
+def _folder(out: Path | None, design: "Study") -> Path:
+    return out or Path("results") / design.name
+
+
+@study.command("serve")
+def serve_it(
+    file: File,
+    live: Live = False,
+    out: Folder = None,
     host: Host = "127.0.0.1",
     port: Port = 8765,
     certificate: Certificate = None,
     key: Key = None,
     behind_proxy: BehindProxy = None,
     browser: Browser = True,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the record of what is played.", metavar="DIR")
-    ] = Path("results/play"),
-    records: Annotated[
-        str | None,
-        typer.Option(
-            help="PostgreSQL database for the record, which several servers may share.",
-            show_default="a file in the folder of --out",
-            metavar="URL",
-        ),
-    ] = None,
-    imports: Imports = None,
 ) -> None:
-    """Play a task in the browser, with an assistant.
+    """Serve a study: a pilot, or live as it was frozen. Ctrl-C ends it.
 
-    Any further option is one of the assistant's, as 'qbumpers list' shows them. Ctrl-C ends it.
-
-    Example: qbumpers play lunar-lander --assistant stochastic-q-bumpers --alpha 0.7
+    Example: qbumpers study serve my-study.toml
     """
     check_installed()
-    import_modules(imports or (), "--import")
-    from qbumpers.study.addresses import Address
-    from qbumpers.study.game import Choice
-    from qbumpers.study.running import play as serve
-    from qbumpers.study.setup import Setup
-    from qbumpers.study.stores import place_of
+    from qbumpers.play.addresses import Address
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.running import opened, records_of, serve_study
+    from qbumpers.study.flow.server import StudyHost
 
-    options = dict(_options_in(context.args))
-    if alpha is not None:
-        options["alpha"] = alpha
-    if assistant is None and not options:
-        choice = Choice(*_DEFAULT)
-    else:
-        choice = Choice(assistant or _DEFAULT[0], options)
     address = Address(host, port, certificate, key, behind_proxy or "")
-    address.check()  # before anything is solved
-    setup = Setup(task, values, discount=discount)
-    place = _database_at(records) if records is not None else out / _RECORDS
+    address.check()
+    design = load_study(file)
+    setups = check_playable(design)
+    _warn_of_identities(file, design)
+    mode, folder = "live" if live else "pilot", _folder(out, design)
+    served = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
 
     def announce(url: str) -> None:
-        OUTPUT.print(f"Play at [bold]{url}[/bold]", soft_wrap=True)
-        where = escape(place_of(place))
-        OUTPUT.print(f"The record goes into {where}; Ctrl-C ends it.", soft_wrap=True)
+        _say(f"The study is at {url}; the records go into {records_of(folder, mode)}")
+        _say(f"The researcher's page is at {url}researcher; its token is {served.token}")
+        _say("Ctrl-C ends it.")
 
-    with contextlib.suppress(KeyboardInterrupt):
-        serve(setup, choice, place, address=address, browser=browser, announce=announce)
-    OUTPUT.print("\nStopped; what was played is kept.")
-
-
-def _database_at(records: str) -> str:
-    from qbumpers.study.stores import is_url
-
-    if not is_url(records):
-        raise RequestError(
-            f"records = {records!r}; postgresql://USER@HOST/DATABASE is needed, or --out for a file"
-        )
-    return records
-
-
-def _options_in(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    """Names and values of an assistant's options: `--p-max 0.9`, `--p-max=0.9`, `--second`."""
-    waiting = list(arguments)
-    while waiting:
-        name = waiting.pop(0)
-        if not name.startswith("--"):
-            raise RequestError(f"argument {name!r}: an option of the assistant begins with --")
-        option, equals, text = name.removeprefix("--").partition("=")
-        if not equals:
-            valued = bool(waiting) and not waiting[0].startswith("--")
-            text = waiting.pop(0) if valued else "true"
-        yield option.replace("-", "_"), _value_of(text)
-
-
-def _value_of(text: str) -> Any:
-    """A value as a TOML file would have it; a text needs no quotation marks."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
+        serve_study(served, setups, address, browser=browser, announce=announce)
+    except KeyboardInterrupt:
+        OUTPUT.print("\nStopped; what happened is kept.")
 
 
-@study.command("replay")
-def replay_records(
-    records: Records,
-    session: Annotated[
-        list[str] | None,
-        typer.Option(help="Only this one; may be repeated.", metavar="ID", show_default="all"),
-    ] = None,
-    check: Annotated[bool, typer.Option("--check", help="Say it here, and show no page.")] = False,
-    port: Port = 8766,
-    browser: Browser = True,
-    imports: Imports = None,
+@study.command("simulate")
+def simulate_study(
+    file: File,
+    participants: Annotated[int, typer.Option(help="How many.", metavar="N", min=1)] = 30,
+    browser: Annotated[
+        bool, typer.Option("--browser", help="Through Chromium instead of the bare WebSocket.")
+    ] = False,
+    out: Folder = None,
 ) -> None:
-    """Decide recorded sessions again, say whether anything comes out differently, and show them.
+    """Let simulated learners take part in a study, with drop-outs, reloads and slow ones.
 
-    Exit status 1 if anything does. Ctrl-C ends the page.
-
-    Example: qbumpers study replay results/play/play.sqlite
+    Example: qbumpers study simulate my-study.toml --participants 90
     """
     check_installed()
-    import_modules(imports or (), "--import")
-    from qbumpers.study.replaying import replay_file
-    from qbumpers.study.running import show
-    from qbumpers.study.showing import Showing
-    from qbumpers.study.stores import shown
-    from qbumpers.study.tables import open_records
+    from qbumpers.study.bots.browser import by_browser
+    from qbumpers.study.bots.rehearsing import by_socket, rehearse, without_waiting
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.running import opened, records_of
 
-    replayed: list[Replayed] = []
-    for found in replay_file(records, session or ()):
-        sizes = f"{counted(found.episodes, 'episode')}, {counted(found.steps, 'step')}"
-        verdict = f"different: {found.difference}" if found.difference else "OK"
-        line = f"{found.session} {found.task}: {sizes}: {verdict}"
-        OUTPUT.print(escape(line), soft_wrap=True)
-        replayed.append(found)
-    if not check:
-        if not replayed:
-            raise RequestError(f"{shown(records)}: it has no session to be shown")
-        showing = Showing(open_records(records, new=False), replayed)
-        with contextlib.suppress(KeyboardInterrupt):
-            show(showing, port=port, browser=browser, announce=_announce_replay)
-    if any(found.difference for found in replayed):
-        raise typer.Exit(1)
+    design = load_study(file)
+    setups = check_playable(design)
+    folder = _folder(out, design)
+    engine = opened(file, design, setups, folder, "simulated")
+    with OUTPUT.status(f"0 of {participants} participants") as status:
+        done = 0
+
+        def advance(_: object) -> None:
+            nonlocal done
+            done += 1
+            status.update(f"{done} of {participants} participants")
+
+        found = rehearse(
+            without_waiting(design), setups, engine, participants,
+            take_part=by_browser if browser else by_socket, at_once=1 if browser else 8,
+            advance=advance,
+        )  # fmt: skip
+    for outcome, count in sorted(found.outcomes.items()):
+        _say(f"{outcome}: {counted(count, 'participant')}")
+    _say(
+        f"{counted(found.reloads, 'reload')}; the records are in {records_of(folder, 'simulated')}"
+    )
 
 
-def _announce_replay(url: str) -> None:
-    OUTPUT.print(f"Watch at [bold]{url}[/bold] ; Ctrl-C ends it.", soft_wrap=True)
+@study.command("freeze")
+def freeze_study(file: File) -> None:
+    """Freeze a study for a preregistration: one JSON, a readable page, and a hash.
 
-
-@study.command("export")
-def export(
-    records: Annotated[
-        str,
-        typer.Argument(help="What play recorded, or a study file.", metavar="RECORDS|STUDY.toml"),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder for the files.", metavar="DIR")],
-    mode: Annotated[
-        str, typer.Option(help="Of a study: live, pilot or simulated.", metavar="MODE")
-    ] = "live",
-    folder: Annotated[
-        Path | None,
-        typer.Option(help="Of a study's records.", show_default="results/NAME", metavar="DIR"),
-    ] = None,
-    imports: Imports = None,
-) -> None:
-    """Write what was played as an experiment's files, a participant in the place of a trial.
-
-    `qbumpers report`, `qbumpers fit` and `qbumpers.load` read them. A study is also written as a
-    Psych-DS data set.
-
-    Example: qbumpers study export results/play/play.sqlite --out results/played
+    Example: qbumpers study freeze my-study.toml
     """
     check_installed()
-    import_modules(imports or (), "--import")
-    if records.endswith(".toml"):
-        from qbumpers.cli.studies import export_data
+    from qbumpers.study.design.freezing import freeze, frozen_path
+    from qbumpers.study.design.sources import check_playable, load_study
 
-        export_data(Path(records), out, mode, folder)
+    design = load_study(file)
+    digest = freeze(file, design, check_playable(design))
+    _say(f"{frozen_path(file)} and its page are written; SHA-256 {digest}")
+
+
+@study.command("backup")
+def back_up_study(
+    file: File,
+    copy: Annotated[Path, typer.Argument(help="Path of the copy.", metavar="COPY")],
+    live: Live = False,
+    out: Folder = None,
+) -> None:
+    """Copy the records of a study, which may be running.
+
+    Example: qbumpers study backup my-study.toml monday.sqlite --live
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import back_up, records_of
+
+    folder = _folder(out, load_study(file))
+    back_up(records_of(folder, "live" if live else "pilot"), copy)
+    _say(f"{copy} is written")
+
+
+@study.command("restore")
+def restore_study(
+    file: File,
+    copy: Annotated[Path, typer.Argument(help="A backup.", metavar="COPY")],
+    live: Live = False,
+    out: Folder = None,
+) -> None:
+    """Put a backup into the place of records that are lost.
+
+    Example: qbumpers study restore my-study.toml monday.sqlite --live
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import records_of, restore
+
+    records = records_of(_folder(out, load_study(file)), "live" if live else "pilot")
+    restore(copy, records)
+    _say(f"{records} is as {copy}")
+
+
+Mode = Annotated[
+    str, typer.Option("--mode", help="Which records: pilot, live or simulated.", metavar="MODE")
+]
+
+
+def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
+    """Export a study: for load, report and fit, and as a Psych-DS data set.
+
+    Args:
+        file: of the study.
+        to: folder for the files.
+        mode: which records.
+        folder: of the records; results/NAME if None.
+    """
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+    from qbumpers.study.outcomes.export import DATASET, export_study
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(folder, design), mode))
+    found = export_study(engine, design, check_playable(design), to)
+    engine.dispose()
+    _say(f"{counted(found.participants, 'participant')} in {to / DATASET}")
+    _say(f"{counted(found.reported, 'complete one')} for: qbumpers report {to}")
+
+
+@study.command("power")
+def power_of_study(file: File, mode: Mode = "simulated", out: Folder = None) -> None:
+    """Say how many participants the planned test needs, from those of a rehearsal.
+
+    Example: qbumpers study power my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+    from qbumpers.study.outcomes.power import power_of
+    from qbumpers.study.outcomes.reading import read_participants
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    found = power_of(design, read_participants(engine, design))
+    first, second = found.analysis.arms
+    _say(
+        f"{found.analysis.measure}: {first} {found.means[0]:.1f} (n = {found.arms[0]}), {second} "
+        f"{found.means[1]:.1f} (n = {found.arms[1]}); d = {found.effect:.2f}"
+    )
+    _say("per arm   power   95% interval   without an effect")
+    plenty = next((place for place, row in enumerate(found.table) if row.power >= 0.99), None)
+    for row in found.table[: None if plenty is None else plenty + 1]:
+        _say(f"{row.size:7d}   {row.power:5.2f}   {row.low:.2f} to {row.high:.2f}   {row.null:.2f}")
+    most = found.table[-1].size
+    low, needed, high = (
+        str(n or f"more than {most}") for n in (found.low, found.needed, found.high)
+    )
+    _say(f"For power {found.analysis.power}: {needed} per arm (95% interval {low} to {high}).")
+
+
+@study.command("forget")
+def forget_participant(
+    file: File,
+    participant: Annotated[
+        str | None, typer.Argument(help="Identifier, or PROLIFIC_PID or class code.", metavar="ID")
+    ] = None,
+    identities: Annotated[
+        bool, typer.Option("--identities", help="Delete all identities instead; data stay.")
+    ] = False,
+    mode: Mode = "live",
+    out: Folder = None,
+) -> None:
+    """Delete everything of a participant, exports included, and leave a dated tombstone.
+
+    Example: qbumpers study forget my-study.toml 4f1c0a9d2b7e6c85
+    """
+    check_installed()
+    from qbumpers.study.design.sources import check_playable, load_study
+    from qbumpers.study.flow.forgetting import delete_identities
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+    from qbumpers.study.outcomes.deletion import forget
+
+    if (participant is None) != identities:
+        raise RequestError("forget: give the ID of a participant, or --identities")
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    if participant is None:
+        _say(f"identities deleted: {delete_identities(engine)}; what they did stays")
         return
-    from qbumpers.experiments.participants import STEPS, export_records
-
-    for found in export_records(records, out):
-        OUTPUT.print(
-            f"[bold]{escape(found.task)}[/bold]: {counted(found.participants, 'participant')}, "
-            f"{counted(found.episodes, 'episode')}, into {escape(str(found.folder))}",
-            soft_wrap=True,
-        )
-        for text in _unfinished(found):
-            OUTPUT.print(text, soft_wrap=True)
-        OUTPUT.print(f"  qbumpers fit {escape(str(found.folder / STEPS))}", soft_wrap=True)
-        if found.pairs:
-            OUTPUT.print(f"  qbumpers report {escape(str(found.folder))}", soft_wrap=True)
+    reached = forget(engine, design, check_playable(design), participant)
+    _say("deleted; a dated tombstone says that somebody was")
+    for folder in reached:
+        _say(f"written anew without them: {folder}")
 
 
-def _unfinished(found: "Exported") -> Iterator[str]:
-    """What is not in the tables of a report, in sentences."""
-    if not found.pairs:
-        yield "No unassisted episode follows an assisted one: there is nothing for a report."
-    elif found.unpaired:
-        yield (
-            f"{counted(found.unpaired, 'episode')} not in the report, which compares each assisted "
-            "episode with the unassisted one after it; played.parquet has all."
-        )
-    if found.unfinished:
-        yield f"{counted(found.unfinished, 'episode')} did not end: steps are there, returns not."
-    if found.idle:
-        yield f"{counted(found.idle, 'session')} without a step."
+@study.command("reconcile")
+def reconcile_study(
+    file: File,
+    table: Annotated[
+        Path, typer.Argument(help="Submissions as Prolific exports them.", metavar="TABLE.csv")
+    ],
+    mode: Mode = "live",
+    out: Folder = None,
+) -> None:
+    """Compare with Prolific's table: who completed there and not here, and the reverse.
+
+    Exit status 1 if there is any.
+
+    Example: qbumpers study reconcile my-study.toml prolific_export.csv
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+    from qbumpers.study.outcomes.reading import read_participants
+    from qbumpers.study.outcomes.recruitment import identities_in, reconcile
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    everybody = read_participants(engine, design)
+    found = reconcile(design, everybody, identities_in(engine), table)
+    for each in found:
+        _say(f"{each.identity}: there {each.there}; here {each.here}")
+    if found:
+        raise typer.Exit(1)
+    _say("OK: both say the same")
 
 
-def check_installed() -> None:
-    """Check that the extra `study` is installed; RequestError naming what is missing if not."""
-    try:
-        import itsdangerous as itsdangerous
-        import msgspec as msgspec
-        import sqlalchemy as sqlalchemy
-        import starlette as starlette
-        import uvicorn as uvicorn
-        import websockets as websockets
-    except ImportError as error:
-        raise RequestError(f"{error.name} is missing; pip install 'qbumpers[study]'") from error
+@study.command("bonus")
+def bonus_of_study(file: File, mode: Mode = "live", out: Folder = None) -> None:
+    """Print the bonuses by the rule of the study, as Prolific takes them.
+
+    Example: qbumpers study bonus my-study.toml
+    """
+    check_installed()
+    from qbumpers.study.design.sources import load_study
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+    from qbumpers.study.outcomes.reading import read_participants
+    from qbumpers.study.outcomes.recruitment import bonus_table, identities_in
+
+    design = load_study(file)
+    engine = read_records(records_of(_folder(out, design), mode))
+    print(bonus_table(design, read_participants(engine, design), identities_in(engine)), end="")

@@ -22,10 +22,10 @@ from qbumpers.experiments.store import EXPERIMENT, VALUES, read_design
 from qbumpers.experiments.tables import EPISODES, encoded
 from qbumpers.experiments.writing import described
 from qbumpers.files import Folder, open_folder
-from qbumpers.study.game import Choice, Episode
-from qbumpers.study.setup import Setup, setup_of
-from qbumpers.study.stores import shown
-from qbumpers.study.tables import (
+from qbumpers.play.game import Choice, Episode
+from qbumpers.play.setup import Setup, setup_of
+from qbumpers.play.stores import shown
+from qbumpers.play.tables import (
     Recorded,
     open_records,
     read_moments,

@@ -1,1 +1,1 @@
-"""Play in the browser: a participant and an assistant at any task that has a display."""
+"""Studies with participants: their file, what participants go through, and what comes of it."""

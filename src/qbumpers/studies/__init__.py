@@ -1,1 +1,0 @@
-"""Studies with participants: their file, what participants go through, and what comes of it."""

@@ -1,6 +1,0 @@
-"""Without the extra `study`, there are no studies."""
-
-from tests.study.conftest import MISSING
-
-if MISSING:
-    collect_ignore_glob = ["test_*.py", "*/test_*.py"]
