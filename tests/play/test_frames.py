@@ -117,7 +117,8 @@ def test_what_the_assistant_could_not_see_is_not_made_up(tmp_path):
 def test_every_frame_is_json(lander, tmp_path):
     path = tmp_path / "play.sqlite"
     record(lander, path, [(BUMPERS, [2, 1, 0])])
-    json.dumps(frames(lander, path, 0))
+    found = frames(lander, path, 0)
+    assert json.loads(json.dumps(found)) == found
 
 
 def test_episodes_say_what_they_came_to(cliff, tmp_path):

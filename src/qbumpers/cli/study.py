@@ -251,7 +251,7 @@ def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
     """Export a study: for load, report and fit, and as a Psych-DS data set.
 
     Args:
-        file: of the study.
+        file: path of the study file.
         to: folder for the files.
         mode: which records.
         folder: of the records; results/NAME if None.

@@ -42,7 +42,7 @@ class Exported(NamedTuple):
     """What was exported of one task.
 
     Attributes:
-        folder: of the files.
+        folder: into which the files go.
         task: its name.
         participants: who played it.
         episodes: that ended.

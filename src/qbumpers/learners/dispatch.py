@@ -28,7 +28,7 @@ def fresh_memory(forgets: Any, settings: Any, shape: Shape, stream: np.ndarray) 
 
     Args:
         forgets: the ways in which it forgets, a tuple.
-        settings: of the learner.
+        settings: hyperparameters; their type says which learner it is.
         shape: of what it learns.
         stream: uint64 [4], random stream of the memory; it does not change.
 
@@ -115,7 +115,7 @@ def forget_between(share: float | None, practice: Practice | None, memory: Any, 
     Args:
         share: as for `forget`; None if no share is forgotten.
         practice: as for `forget_by_age`, then an episode older; None if age means nothing.
-        memory: of a learner.
+        memory: what a learner has learned so far.
         fresh: a memory of the same learner as it was at first; anything if nothing is forgotten.
     """
     if share is not None:

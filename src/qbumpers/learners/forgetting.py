@@ -114,7 +114,7 @@ def fade_by_age(table: np.ndarray, origin: np.ndarray, practice: Practice) -> No
             belongs to each action; else a number belongs to its state, and is as old as what was
             practised there last. A table of other than S rows is left alone.
         origin: float64 [S, K], as it was at first.
-        practice: of the learner.
+        practice: how often, and when, each pair was practised.
     """
     states, actions = practice.age.shape
     if table.shape[0] != states:

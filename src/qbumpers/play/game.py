@@ -19,7 +19,7 @@ class Choice(NamedTuple):
     """Who assists in an episode.
 
     Attributes:
-        name: of a rule.
+        name: under which a rule is registered.
         options: of the rule, JSON-like.
         assisted: whether it does; if not, nobody overrides.
     """
@@ -203,7 +203,7 @@ def resumed(setup: Setup, seed: int, played: Sequence[Played]) -> Game:
 
     Args:
         setup: what was played.
-        seed: of the session.
+        seed: from which the session's noise and chance come.
         played: its episodes, in their order.
 
     Raises:

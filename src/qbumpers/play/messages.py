@@ -49,7 +49,7 @@ class Begin(_Message, tag="begin"):
     Attributes:
         episode: its number; another one than the next is late or repeated, and ignored.
         assistant: name of a rule.
-        options: of the rule.
+        options: by name, what the rule is set to.
         assisted: whether the assistant helps.
     """
 

@@ -65,7 +65,7 @@ class Player:
     Args:
         tenure: by which its steps are added to the record.
         game: as far as the record goes.
-        writer: of the records.
+        writer: adds rows to the records.
         second: how long a second of the countdown takes.
         with_view: whether the page is sent what the assistant sees.
 
@@ -103,7 +103,7 @@ class Player:
         """Show a page where the session is; `connection` is that page already.
 
         Args:
-            connection: of the page.
+            connection: to the page that plays.
             hello: what it said of itself.
             facts: what else it needs to know.
         """

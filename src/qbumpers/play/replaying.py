@@ -58,7 +58,7 @@ def chosen_sessions(engine: sql.Engine, sessions: Sequence[str]) -> list[str]:
     """Those of the sessions of a record that are meant.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         sessions: identifiers; all if there are none.
 
     Raises:

@@ -94,7 +94,7 @@ def serve(
         address: where to listen, checked.
         browser: whether to open the page in a browser.
         announce: is called with the page's URL before anyone is served.
-        path: of the page.
+        path: where the page is, below the host.
 
     Raises:
         RequestError: if the address is in use, or what `make` raises.

@@ -138,7 +138,7 @@ class Sessions(Entrance):
     Args:
         setup: what is played.
         choice: who assists unless the participant chooses.
-        engine: of the records.
+        engine: as `open_records` gave it.
         second: how long a second of the countdown takes.
     """
 

@@ -28,7 +28,7 @@ class Showing:
     """Recorded sessions, as a page asks for them.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         replayed: the sessions that are shown, held to rule and task already.
     """
 

@@ -14,7 +14,7 @@ class TabularStepper:
     """A tabular task, stepped through like a `qbumpers.tasks.stepping.Stepper`.
 
     Args:
-        dynamics: of the task.
+        dynamics: where actions lead, and what for.
     """
 
     def __init__(self, dynamics: Dynamics) -> None:

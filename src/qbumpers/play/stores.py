@@ -115,7 +115,7 @@ def reading(engine: sql.Engine) -> Generator[sql.Connection]:
     """A connection that sees the records as they are at its first look, and keeps no writer out.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
 
     Yields:
         The connection.
@@ -132,7 +132,7 @@ def lock(connection: sql.Connection, name: str) -> None:
 
     Args:
         connection: in the transaction that holds it to its end. One of SQLite holds all locks.
-        name: of the lock.
+        name: of what is locked, any text.
     """
     if is_postgresql(connection):
         connection.execute(_LOCK, {"name": name})
@@ -155,7 +155,7 @@ class Channel:
     """The connection of one thread that writes, made anew after an error.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
     """
 
     def __init__(self, engine: sql.Engine) -> None:

@@ -151,7 +151,7 @@ def take_session(engine: sql.Engine, session: str) -> Tenure | None:
     """Take a session from whichever server drives it; what that one added before is committed.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         session: identifier.
 
     Returns:
@@ -190,7 +190,7 @@ def step_row(session: str, number: int, episode: int, step: Step) -> dict[str, A
     """The columns of a step that say what was decided and done.
 
     Args:
-        session: of the participant.
+        session: identifier, as signed in the participant's token.
         number: of the step in the session, from 0.
         episode: of the participant, from 0.
         step: the record.
@@ -236,7 +236,7 @@ class Recorded(NamedTuple):
 
     Attributes:
         session: identifier.
-        seed: of the session.
+        seed: from which the session's noise and chance come.
         setup: description of what was played, see `Setup.description`.
         played: every episode.
     """
@@ -263,7 +263,7 @@ def read_session(engine: sql.Engine, session: str) -> Recorded | None:
     """What is recorded of a participant.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         session: identifier.
 
     Returns:
@@ -311,7 +311,7 @@ def read_moments(engine: sql.Engine, session: str) -> list[Moment]:
     """How every step of a session came about, in their order.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         session: identifier.
     """
     columns = [STEPS.c[field] for field in Moment._fields]

@@ -25,7 +25,7 @@ def bring_up_to_date(engine: sql.Engine, tables: sql.MetaData, where: str) -> No
     """Make the tables of records if there are none, or bring older ones up to date, all or nothing.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         tables: of the present version, with `about`, the one that says the version.
         where: for messages, what the records are.
 

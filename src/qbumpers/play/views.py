@@ -63,7 +63,7 @@ def picture(display: Display, state: Any, last: Step | None) -> dict[str, Any]:
     """A state as it is drawn and said, with the step that led to it, JSON-like.
 
     Args:
-        display: of the task.
+        display: how the task is shown and played.
         state: to be shown.
         last: the step before; None at the start of an episode.
     """

@@ -306,7 +306,7 @@ def run_episodes(
         assistance: what helps in it.
         learner: what is simulated, with what lies around it.
         minds: what is remembered.
-        streams: of the trial.
+        streams: of all trials, and this trial's own, which has begun.
         trial: place of the trial among the outcomes.
         retention: R, episodes at the end without the assistant.
         sinks: what is to be filled.

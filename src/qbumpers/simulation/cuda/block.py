@@ -48,7 +48,7 @@ class Begun(NamedTuple):
     What each trial has of its own is a `Near` or a `Far`, whose array is that of one trial.
 
     Attributes:
-        dynamics: of the task.
+        dynamics: where actions lead, and what for.
         assistance: as the loops take it.
         learner: likewise.
         minds: likewise.

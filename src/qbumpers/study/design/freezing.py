@@ -58,7 +58,7 @@ def freeze(file: Path, study: Study, setups: Mapping[str, Setup]) -> str:
     """Write the frozen study and its readable page beside the study file.
 
     Args:
-        file: of the study.
+        file: path of the study file.
         study: in it.
         setups: what is played in each block, by its id.
 

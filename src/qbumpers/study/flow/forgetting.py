@@ -14,7 +14,7 @@ def delete_participant(engine: sql.Engine, participant: str, reason: str) -> boo
     """Delete everything of a participant, and leave a dated tombstone that does not say whose.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         participant: identifier.
         reason: for the tombstone, for instance "withdrawn".
 

@@ -34,7 +34,7 @@ def researcher_routes(host: StudyHost, setups: Mapping[str, Setup]) -> Sequence[
     The token is sent in a header, never in an address: addresses are logged.
 
     Args:
-        host: of the study.
+        host: serves the study.
         setups: what is played in each block, by its id.
     """
 
@@ -67,7 +67,7 @@ def overview(host: StudyHost) -> dict[str, Any]:
     """Who is where, counts per condition, drop-out, latency and learning curves, JSON-like.
 
     Args:
-        host: of the study.
+        host: serves the study.
     """
     study, now = host.study, time.time()
     came = participants_in(host.engine)

@@ -36,10 +36,10 @@ def opened(
     """The records of a study, to be added to.
 
     Args:
-        file: of the study.
+        file: path of the study file.
         study: in it.
         setups: what is played in each block, by its id.
-        folder: of the records.
+        folder: in which the records are.
         mode: "pilot", "live" or "simulated".
 
     Raises:
@@ -62,7 +62,7 @@ def serve_study(
     """Serve a study until Ctrl-C.
 
     Args:
-        host: of the study.
+        host: serves the study.
         setups: what is played in each block, by its id.
         address: where to listen, checked.
         browser: whether to open the page in a browser.

@@ -69,7 +69,7 @@ class StudyHost(Entrance):
     Args:
         study: what it is.
         setups: what is played in each block, by its id.
-        engine: of the records.
+        engine: as `open_records` gave it.
         mode: "pilot" or "live".
         exposed: whether states are sent as they are, for simulated learners.
         second: how long a second of a countdown takes.
@@ -77,8 +77,8 @@ class StudyHost(Entrance):
     Attributes:
         study: what it is.
         conditions: by name.
-        writer: of the records.
-        engine: of the records.
+        writer: adds rows to the records.
+        engine: as `open_records` gave it.
         exposed: see above.
         second: see above.
         visits: participants who are there, by identifier.
@@ -148,7 +148,7 @@ class StudyHost(Entrance):
         """Write down what leads to another page, and assign a condition if it is time.
 
         Args:
-            visit: of the participant.
+            visit: of the participant whose page sent it.
             event: what happened.
         """
         following = after(self.study, visit.now, event)
@@ -176,7 +176,7 @@ class StudyHost(Entrance):
         """The session in which a block is played, and how far it has come.
 
         Args:
-            visit: of the participant.
+            visit: of the participant whose page sent it.
             block: that is played.
 
         Raises:

@@ -150,7 +150,7 @@ def events_of(
     """What happened to participants, in order.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         participants: whom; everybody if None.
     """
     query = sql.select(LOG).order_by(LOG.c.entry)

@@ -37,7 +37,7 @@ class Host(Protocol):
     Attributes:
         study: what it is.
         conditions: by name.
-        writer: of the records.
+        writer: adds rows to the records.
         exposed: whether states are sent as they are, for simulated learners.
         second: how long a second of a countdown takes.
     """
@@ -89,7 +89,7 @@ class Visit:
     """A participant with at most one page; every answer is committed before the next page.
 
     Args:
-        host: of the study.
+        host: serves the study.
         participant: identifier.
         now: where they are.
 

@@ -21,7 +21,7 @@ def forget(engine: sql.Engine, study: Study, setups: Mapping[str, Setup], who: s
     Reports in those folders are deleted: their numbers had the participant's data.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         study: whose records they are.
         setups: what is played in each block, by its id.
         who: the identifier of the participant, or their identity to the recruitment.

@@ -41,7 +41,7 @@ class Exported(NamedTuple):
     Attributes:
         participants: everybody.
         reported: those of the report: complete, with every probe.
-        folder: of the files.
+        folder: into which the files go.
     """
 
     participants: int
@@ -64,7 +64,7 @@ def export_study(
     who are not complete are in the data set alone.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         study: whose records they are.
         setups: what is played in each block, by its id.
         folder: of the files; what an earlier export left there is written anew.

@@ -82,7 +82,7 @@ def read_participants(engine: sql.Engine, study: Study) -> list[Participant]:
     """What is recorded of everybody, the earliest first.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         study: whose records they are.
     """
     events = events_of(engine)
@@ -98,7 +98,7 @@ def read_participant(
     """What is recorded of one participant.
 
     Args:
-        engine: of the records.
+        engine: as `open_records` gave it.
         study: whose records they are.
         name: identifier.
         came: when, in seconds since 1970.
