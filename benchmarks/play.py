@@ -3,11 +3,11 @@
 A server in a process of its own, on one core; this process is every page at once, on another core.
 Every step is committed to the record before it is shown.
 
-- A task that waits for keys is played at five keys per second, CartPole at 50: a step is as late as
-  its answer takes.
-- A task in real time goes by its own clock: a step is late by what it takes longer than a tick
-  after the one before. A key also waits for the next tick, up to 20 ms at 50 Hz: the time from a
-  key to the state that it led to is in the columns `key`.
+- A task that waits for keys is played at five keys per second: a step is as late as its answer
+  takes.
+- A task in real time goes by its own clock, at 50 Hz here: a step is late by what it takes longer
+  than a tick after the one before. A key also waits for the next tick, up to 20 ms: the time from
+  a key to the state that it led to is in the columns `key`.
 
 What the machine itself adds, with other work going on, is in the column `timer`: how late a bare
 timer of the same rate is on the server's core, 99%, just before.
@@ -35,8 +35,10 @@ from websockets.typing import Origin
 
 CORES = os.sched_getaffinity(0)
 BUMPERS = {"assistant": "stochastic-q-bumpers", "options": {"alpha": 0.1}}
-KEYS = {"cliff-walking": (5, [0, *[1] * 11, 2]), "CartPole-v1": (50, [0, 1])}
+KEYS = {"cliff-walking": (5, [0, *[1] * 11, 2])}
 """Of tasks that wait for them: how many per second, and which, again and again in an episode."""
+
+RATE = 50  # of tasks in real time, per second
 
 TASKS = {
     "cliff-walking": (10, 100, 190),
@@ -122,6 +124,8 @@ def serve(task: str, records: str) -> None:
         setup = Setup(task, values, discount=0.99)
     else:
         setup = Setup(task)
+    if task not in KEYS:
+        setup.display = setup.display._replace(rate=RATE)  # CartPole's own is half of it
     sessions = Sessions(setup, choice, open_records(records), second=0.001)
     print(f"http://{address}/", flush=True)
     serve_until_stopped(make_application(sessions, [address]), listening)
