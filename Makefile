@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 GPU_VENV := .venv-gpu
 
-.PHONY: help demo test test-docs test-slow test-study test-gpu-compile test-gpu soak lint bench docs dist clean
+.PHONY: help demo test test-docs test-slow test-study soak test-gpu-compile test-gpu lint bench docs dist clean
 
 help:  ## Show what there is to make
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

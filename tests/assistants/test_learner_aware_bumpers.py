@@ -172,7 +172,8 @@ def test_the_filter_finds_out_what_overrides_are_to_a_learner(perception):
     assert found.count(perception) >= 3
 
 
-@pytest.mark.parametrize("name", [NAMES[0], pytest.param(NAMES[1], marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
 def test_transition_learners_are_better_off_than_with_bumpers(name):
     found = {
         each: simulate(TASK, make_assistant(each, alpha=0.2), trials=60).outcomes

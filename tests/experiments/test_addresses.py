@@ -33,6 +33,7 @@ def test_an_address_where_nothing_listens_fails_at_once():
     assert time.monotonic() - begun < 5
 
 
+@pytest.mark.slow
 def test_an_address_where_something_else_listens_fails_in_time(monkeypatch):
     monkeypatch.setattr(addresses, "_CONNECTING", 5.0)
     with socket.create_server(("127.0.0.1", 0)) as server:

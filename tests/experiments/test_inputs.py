@@ -119,7 +119,7 @@ def test_a_task_that_behaves_otherwise_under_its_name_is_refused(here, monkeypat
     run_into("out", **changes)
 
 
-@pytest.mark.parametrize("over", [False, True])
+@pytest.mark.parametrize("over", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_files_of_options_are_those_that_the_folder_kept(own_rule, here, monkeypatch, over):
     rule = {"name": "budget", "per_episode": 4, "of": OWN} if over else OWN
     run_into("out", assistants=[rule])

@@ -163,6 +163,7 @@ def test_ctrl_c_stops_at_once_keeps_what_is_finished_and_says_how_to_go_on(
         assert finished(path, folder) == uninterrupted
 
 
+@pytest.mark.slow
 def test_of_two_runs_at_once_one_ends_and_the_other_says_why_it_does_not(
     path, tmp_path, uninterrupted
 ):

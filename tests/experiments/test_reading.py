@@ -133,6 +133,7 @@ def test_only_who_wants_to_simulate_is_told_what_is_missing(made, tmp_path, miss
             make_plan(load(made[0]).experiment)
 
 
+@pytest.mark.slow
 def test_what_is_registered_otherwise_by_now_does_not_matter(made, tmp_path):
     """Names and options of today are not those of the run."""
     folder, ids = made

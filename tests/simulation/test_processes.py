@@ -75,12 +75,10 @@ STARTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "script", "standard_input"),
-    [
-        pytest.param(*start, id=name, marks=[pytest.mark.slow] * (name != "a script without one"))
-        for name, start in STARTS.items()
-    ],
+    [pytest.param(*start, id=name) for name, start in STARTS.items()],
 )
 def test_two_processes_give_the_numbers_of_one(tmp_path, arguments, script, standard_input):
     (tmp_path / "script.py").write_text(script, encoding="utf-8")
