@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from qbumpers.play.game import Choice
-from tests.play.browsing import FLAGS
+from tests.browsing import FLAGS
 from tests.play.serving import served
 
 PILOT = (Path(__file__).parent / "pilot.js").read_text(encoding="utf-8")

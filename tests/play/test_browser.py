@@ -6,8 +6,8 @@ import pytest
 
 from qbumpers.play.game import Choice
 from qbumpers.play.tables import open_records, read_session, sessions_in
+from tests.browsing import AXE, WIDTHS, violations
 from tests.narrowing import present
-from tests.play.browsing import AXE, WIDTHS, violations
 from tests.play.serving import process, served
 
 pytestmark = pytest.mark.study

@@ -5,7 +5,7 @@ import sqlite3
 import pytest
 
 from qbumpers.play.game import Choice
-from tests.play.browsing import AXE, WIDTHS, violations
+from tests.browsing import AXE, WIDTHS, violations
 from tests.play.recording import record
 from tests.play.serving import AROUND, DOWN, RIGHT, UP, replayed
 
