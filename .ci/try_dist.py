@@ -1,7 +1,7 @@
 """Try a built distribution as its users will: `python .ci/try_dist.py dist`.
 
 Looks at what is in it, installs the wheel into a fresh environment of every Python here that it is
-made for, and runs a small demo from there, outside the checkout.
+made for, runs a small demo from there, outside the checkout, and opens the page of play.
 """
 
 import concurrent.futures
@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import urllib.request
 import zipfile
 from email.parser import BytesParser
 from functools import partial
@@ -25,6 +26,7 @@ IN_SOURCES = {
 }  # fmt: skip
 GENERATED = re.compile(r"(^|/)(__pycache__|\.[a-z_]+_cache)(/|$)|\.(pyc|nbi|nbc)$")
 RELATIVE = re.compile(r"\]\((?!https?://|#)[^)]*\)")
+PAGE = ("", "static/main.js", "static/style.css", "static/uplot/uPlot.esm.js")
 DEMO = ("reproduce", "cliff-walking", "--trials", "1", "--alphas", "0.5", "--out", "demo")
 
 _VERSION = "import ensurepip, sys, sysconfig; print(*sys.version_info[:3], sys.executable)"
@@ -43,7 +45,7 @@ def main() -> None:
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         problems = pool.map(partial(tried, wheel), found.values())
         for version, problem in zip(found, problems, strict=True):
-            print(f"Python {version}: {problem or 'installed, demo run'}", flush=True)
+            print(f"Python {version}: {problem or 'installed, demo run, page served'}", flush=True)
             if problem:
                 sys.exit(1)
     untried = [each for each in promised if each not in {v.rpartition(".")[0] for v in found}]
@@ -114,12 +116,36 @@ def tried(wheel: Path, python: str) -> str:
             [own + "pip", "check"],
             [own + "python", "-c", "import qbumpers; assert '/own/' in qbumpers.__file__"],
             [own + "qbumpers", *DEMO],
+            [own + "pip", "install", "--quiet", "--disable-pip-version-check", f"{wheel}[study]"],
         ):
             done = subprocess.run(command, cwd=place, env=inherited, capture_output=True, text=True)
             if done.returncode:
                 return f"{' '.join(command)} failed:\n{done.stdout}\n{done.stderr}"
         if not Path(place, "demo", "report.html").is_file():
             return "the demo wrote no report"
+        return served(own, place, inherited)
+
+
+def served(own: str, place: str, environment: dict[str, str]) -> str:
+    """Open the page of play; what is not there, or nothing."""
+    with subprocess.Popen(
+        [own + "qbumpers", "play", "cliff-walking", "--no-browser", "--port", "0"],
+        cwd=place, env={**environment, "PYTHONUNBUFFERED": "1"}, stdout=subprocess.PIPE, text=True,
+    ) as server:  # fmt: skip
+        try:
+            assert server.stdout is not None
+            said = server.stdout.readline()
+            address = re.search(r"http://\S+/", said)
+            if address is None:
+                return f"play began with {said!r}"
+            for part in PAGE:
+                with urllib.request.urlopen(address[0] + part, timeout=30) as answer:
+                    if not answer.read():
+                        return f"play serves an empty {part or 'page'}"
+        except OSError as error:
+            return f"play does not serve its page: {error}"
+        finally:
+            server.terminate()
     return ""
 
 
