@@ -1,5 +1,6 @@
 """What every test shares."""
 
+import shutil
 import signal
 import sys
 
@@ -9,6 +10,7 @@ from hypothesis import settings
 from qbumpers import cli
 from qbumpers.assistants import registry
 from qbumpers.learners import registry as learners
+from tests.play.browsing import FLAGS
 from tests.texts import plain
 
 # Compiled code is slow once, when it compiles; examples are the same in every run.
@@ -45,6 +47,19 @@ def own_registry_of_module():
     with pytest.MonkeyPatch.context() as monkeypatch:
         _registries_of_its_own(monkeypatch)
         yield
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium, one for all tests: a thread cannot drive two."""
+    found = shutil.which("chromium")
+    if found is None:
+        pytest.skip("chromium is not installed: .ci/install_browser")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture

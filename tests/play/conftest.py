@@ -1,11 +1,10 @@
 """What tests of playing share; without the extra `study` there are none."""
 
 import importlib.util
-import shutil
 
 import pytest
 
-from tests.play.browsing import FLAGS, WIDTHS
+from tests.play.browsing import WIDTHS
 
 LIBRARIES = ("starlette", "uvicorn", "websockets", "msgspec", "sqlalchemy", "itsdangerous")
 MISSING = [name for name in LIBRARIES if importlib.util.find_spec(name) is None]
@@ -35,18 +34,6 @@ def lander():
 
 
 LOST = ("ERR_CONNECTION", "ERR_SOCKET_NOT_CONNECTED")
-
-
-@pytest.fixture(scope="session")
-def browser():
-    found = shutil.which("chromium")
-    if found is None:
-        pytest.skip("chromium is not installed: .ci/install_browser")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

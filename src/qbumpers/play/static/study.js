@@ -96,7 +96,9 @@ function button(text, act, primary = true) {
   return made;
 }
 
-const buttons = (...made) => byId("form").append(element("div", { className: "choices" }, ...made));
+function buttons(...made) {
+  byId("form").append(element("div", { className: "choices" }, ...made));
+}
 
 function plain() {
   buttons(button(words.next));
