@@ -230,6 +230,7 @@ function stop(text, label) {
 
 function askForCode(wrong = "") {
   stop(wrong, words.enter);
+  byId("link").textContent = "";
   byId("heading").textContent = words.enter_code;
   const input = element("input", { type: "text", id: "own-code", value: arrival.code ?? "" });
   input.setAttribute("aria-labelledby", "heading");
