@@ -98,11 +98,29 @@ def test_was_that_you_is_asked_over_the_game(page, served, monkeypatch):
     assert page.locator("#choices button").all_inner_texts() == [
         "That was me", "That was the assistant", "I cannot tell",
     ]  # fmt: skip
+    assert page.is_hidden("#override")  # it would lie over the question
+    board, sheet = (page.locator(part).bounding_box() for part in ("#board", ".sheet"))
+    assert board["y"] <= sheet["y"]
+    assert sheet["y"] + sheet["height"] <= board["y"] + board["height"]
     check_page(page, "was that you?")
     page.click("#choices button:nth-child(2)")
     page.wait_for_selector("#overlay", state="hidden")
     [visit] = host.visits.values()
     assert visit.now.condition == "helped"
+
+
+def test_a_task_in_real_time_is_paused(page, served):
+    address, _ = served(block("training"), task="lunar-lander", step_limit=1000)
+    come(page, address)
+    go(page)
+    heading(page, "Training")
+    page.click("#choices button.primary")
+    page.wait_for_selector("#overlay", state="hidden")
+    check_page(page, "in real time")
+    page.click("#pause")
+    page.wait_for_selector("#overlay:visible")
+    assert page.inner_text("#headline") == "Paused"
+    check_page(page, "paused")
 
 
 def test_scales_numbers_and_the_keyboard_that_is_needed(page, served):
