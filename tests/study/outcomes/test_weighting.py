@@ -10,6 +10,7 @@ from qbumpers.errors import RequestError
 from qbumpers.play.game import Choice, Game
 from qbumpers.play.setup import Setup
 from qbumpers.study.outcomes.weighting import compare_settings, self_normalised, weighted_return
+from tests.study.flow.studies import block, study_of
 
 SETUP = Setup("cliff-walking", step_limit=5)
 
@@ -91,19 +92,22 @@ def test_too_little_is_refused():
 
 
 def test_a_condition_of_a_study_is_weighted(study, setups, participants):
-    condition = "helped/no"
-    [found] = compare_settings(study, setups, participants, condition, {"probability": 0.6})
-    played = [
-        [episode.total for episode in block.episodes if episode.choice.assisted]
-        for each in participants
-        if each.now.condition == condition
-        for block in each.blocks
-        if block.phase == "training"
-    ]
+    totals = {
+        condition: [
+            [episode.total for episode in block.episodes if episode.choice.assisted]
+            for each in participants
+            if each.now.condition == condition
+            for block in each.blocks
+            if block.phase == "training"
+        ]
+        for condition in ("helped/no", "helped/yes")
+    }
+    condition, theirs = max(totals.items(), key=lambda pair: len(pair[1]))  # others may drop out
+    [found] = compare_settings(study, setups, participants, condition, {"probability": 0.52})
     assert found.block == "training"
-    assert found.logged.participants == found.other.participants == len(played)
-    assert found.logged.mean == pytest.approx(np.mean(played))
-    assert found.logged.effective == pytest.approx(3 * len(played))
+    assert found.logged.participants == found.other.participants == len(theirs)
+    assert found.logged.mean == pytest.approx(np.mean(theirs))
+    assert found.logged.effective == pytest.approx(3 * len(theirs))
     assert found.other.effective < found.logged.effective
     for changes, name, message in [
         ({"probability": 0.6}, "helped", "unknown condition 'helped'"),
@@ -115,3 +119,10 @@ def test_a_condition_of_a_study_is_weighted(study, setups, participants):
             compare_settings(study, setups, participants, name, changes)
     with pytest.raises(RequestError, match="nobody has finished its training yet"):
         compare_settings(study, setups, [], condition, {"probability": 0.6})
+
+
+def test_a_yoked_condition_has_no_rule_to_be_changed():
+    yoked = [{"name": "helped", "assistant": "maximal"}, {"name": "yoked", "yoked_to": "helped"}]
+    study = study_of(block("training"), conditions=yoked)
+    with pytest.raises(RequestError, match="it is yoked to helped"):
+        compare_settings(study, {}, [], "yoked", {"probability": 0.5})
