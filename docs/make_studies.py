@@ -8,13 +8,19 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from make_play import saved
 from playwright.sync_api import sync_playwright
 
+from qbumpers.study.bots.rehearsing import rehearse
+from qbumpers.study.design.sources import load_study, setups_of
+from qbumpers.study.flow.running import opened
+
 EXAMPLE = Path(__file__).parents[1] / "examples" / "study.toml"
+LEARNERS = 24
 AROUND = ["ArrowUp", *["ArrowRight"] * 11, "ArrowDown"]
 
 
@@ -52,9 +58,50 @@ def up_to_training(page: Any) -> None:
     page.wait_for_function("() => document.getElementById('heading').textContent === 'Training'")
 
 
+def participant(browser: Any, url: str) -> None:
+    """Consent, and the comprehension check; then on to the training."""
+    page = browser.new_page(viewport={"width": 1000, "height": 760})
+    page.goto(url)
+    page.wait_for_selector("#form button.primary")
+    saved(page, "study-consent.png")
+    up_to_training(page)
+
+
+def phone(browser: Any, url: str) -> None:
+    """The training, on a small screen in the dark."""
+    page = browser.new_page(
+        viewport={"width": 390, "height": 760}, color_scheme="dark", has_touch=True
+    )
+    page.goto(url)
+    up_to_training(page)
+    walk(page, AROUND[:4])
+    saved(page, "study-phone.png")
+
+
+def researcher(browser: Any, url: str, token: str) -> None:
+    """Who is where, and the learning curves."""
+    page = browser.new_page(viewport={"width": 900, "height": 1130})
+    page.goto(f"{url}researcher")
+    page.fill("#token", token)
+    page.click("#form button")
+    page.wait_for_selector("#curves canvas")
+    saved(page, "study-researcher.png")
+
+
+def pilot(folder: Path) -> None:
+    """Let simulated learners come before, so that there are curves."""
+    study = load_study(EXAMPLE)
+    setups = setups_of(study)
+    engine = opened(EXAMPLE, study, setups, folder, "pilot")
+    rehearse(study, setups, engine, LEARNERS)
+    engine.dispose()
+
+
 def main() -> None:
     """Take every picture."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as running:
+        with ThreadPoolExecutor(1) as pool:  # this thread's loop is the browser's
+            pool.submit(pilot, Path(folder)).result()
         command = [sys.executable, "-m", "qbumpers", "study", "serve", str(EXAMPLE), "--port", "0"]
         with subprocess.Popen(
             [*command, "--no-browser", "--out", folder], stdout=subprocess.PIPE, text=True
@@ -66,24 +113,9 @@ def main() -> None:
             browser = running.chromium.launch(
                 executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
             )
-            page = browser.new_page(viewport={"width": 1000, "height": 760})
-            page.goto(found[0])
-            page.wait_for_selector("#form button.primary")
-            saved(page, "study-consent.png")
-            up_to_training(page)
-            researcher = browser.new_page(viewport={"width": 1000, "height": 620})
-            phone = browser.new_page(
-                viewport={"width": 390, "height": 760}, color_scheme="dark", has_touch=True
-            )
-            phone.goto(found[0])
-            up_to_training(phone)
-            walk(phone, AROUND[:4])
-            saved(phone, "study-phone.png")
-            researcher.goto(f"{found[0]}researcher")
-            researcher.fill("#token", token)
-            researcher.click("#form button")
-            researcher.wait_for_selector("#people tbody tr")
-            saved(researcher, "study-researcher.png")
+            participant(browser, found[0])
+            phone(browser, found[0])
+            researcher(browser, found[0], token)
             browser.close()
             server.terminate()
 

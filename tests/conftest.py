@@ -49,6 +49,19 @@ def own_registry_of_module():
         yield
 
 
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium, one for all tests: a thread cannot drive two."""
+    found = shutil.which("chromium")
+    if found is None:
+        pytest.skip("chromium is not installed: .ci/install_browser")
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
+        yield browser
+        browser.close()
+
+
 @pytest.fixture
 def call(monkeypatch, capsys):
     """Run the command with arguments; its exit status, output and errors, spaces collapsed."""

@@ -33,6 +33,13 @@ def test_a_study_from_its_file_to_forgetting(file, tmp_path, call):
     [table] = (exported / "dataset" / "data").glob("*participants_data.csv")
     participant = table.read_text(encoding="utf-8").splitlines()[1].partition(",")[0]
     where = ["--mode", "simulated", "--out", out]
+    for condition, message in [
+        ("bumpers", "weights: assisted episodes of 1 participant; at least 2 are needed"),
+        ("bumper", "unknown condition 'bumper' (did you mean 'bumpers'?)"),
+    ]:
+        arguments = ["--condition", condition, "--alpha", "0.4", *where]
+        status, _, error = call("study", "estimate", str(file), *arguments)
+        assert (status, message in error) == (2, True), error
     status, said, _ = call("study", "forget", str(file), participant, *where)
     assert (status, f"written anew without them: {exported}" in said) == (0, True)
     assert participant not in table.read_text(encoding="utf-8")
@@ -47,6 +54,7 @@ def test_what_is_wrong_is_said_in_one_line(file, tmp_path, call):
         (["serve", str(file), "--live", *out], "freeze the study first"),
         (["forget", str(file), *out], "give the ID of a participant, or --identities"),
         (["forget", str(file), "x", *out], "serve or simulate the study first"),
+        (["estimate", str(file), "--condition", "bumpers", *out], "serve or simulate the study"),
         (["reconcile", str(file), "none.csv", *out], "serve or simulate the study first"),
         (["backup", str(file), str(tmp_path / "b"), *out], "there is no such file"),
         (["check", str(tmp_path / "no.toml")], "No such file"),

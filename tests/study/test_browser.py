@@ -1,81 +1,25 @@
-"""The example study in a real browser, from consent to completion, at both sizes."""
+"""The example study in a real browser, from consent to completion, at both sizes; and its data."""
 
-import os
-import re
 import shutil
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from tests.narrowing import present
+import qbumpers
+from tests.browsing import WIDTHS
+from tests.study.browsing import DONE, Server, check_page, go, heading, play
+from tests.study.outcomes.psych_ds_rules import violations
 
 pytestmark = pytest.mark.study
 
-ROOT = Path(__file__).parents[2]
-AXE = ROOT / ".browser" / "node_modules" / "axe-core" / "axe.min.js"
-SIZES = {"desktop": (1280, 860), "phone": (390, 844)}
-TAGS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
-DONE = "https://example.org/done"
-
-
-@pytest.fixture
-def open_page(browser):
-    """Opens pages; whatever goes wrong in one is an error of the test."""
-    wrong, contexts = [], []
-
-    def open_page(device="desktop", scheme="light"):
-        width, height = SIZES[device]
-        context = browser.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme,
-            has_touch=device == "phone", reduced_motion="reduce",
-        )  # fmt: skip
-        context.route(f"{DONE}**", lambda route: route.fulfill(body="<title>back</title>"))
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(15_000)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("console", lambda said: said.type == "error" and wrong.append(said.text))
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
-    # A server that is gone is what some tests are about; a wrong token is refused.
-    assert [text for text in wrong if "ERR_CONNECTION" not in text and "403" not in text] == []
-
-
-class Server:
-    """`qbumpers study serve` in a process of its own, at a port that stays."""
-
-    def __init__(self, file, out):
-        self._arguments, self._port = [str(file), "--out", str(out)], "0"
-        self.start()
-
-    def start(self):
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "qbumpers", "study", "serve", *self._arguments, "--no-browser",
-             "--port", self._port],
-            stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )  # fmt: skip
-        output = present(self._process.stdout)
-        found = re.search(r"http://(127\.0\.0\.1:(\d+))/", output.readline())
-        assert found, "it does not say where it serves"
-        self.address, self._port = found[1], found[2]
-        self.token = output.readline().split()[-1]
-
-    def kill(self):
-        self._process.kill()
-        self._process.wait(15)
-        present(self._process.stdout).close()
+EXAMPLE = Path(__file__).parents[2] / "examples" / "study.toml"
 
 
 @pytest.fixture
 def example(tmp_path):
     """The example study, shortened, with a link to go back to."""
-    text = (ROOT / "examples" / "study.toml").read_text(encoding="utf-8")
+    text = EXAMPLE.read_text(encoding="utf-8")
     for before, now in [
         ("step_limit = 60", "step_limit = 4"),
         ("episodes = 8 ", "episodes = 2 "),
@@ -95,56 +39,8 @@ def server(example, tmp_path):
     running.kill()
 
 
-def violations(page):
-    if not AXE.is_file():
-        return []
-    page.evaluate(AXE.read_text(encoding="utf-8"))
-    found = page.evaluate("tags => axe.run({runOnly: tags})", TAGS)
-    return [(each["id"], [n["target"] for n in each["nodes"]]) for each in found["violations"]]
-
-
-def heading(page, text):
-    page.wait_for_function(
-        "text => document.getElementById('heading').textContent === text", arg=text
-    )
-    assert violations(page) == [], text
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), text
-
-
-def go(page):
-    page.click("#form button.primary")
-
-
-def play(page, device, after=None):
-    """Play episodes until the block is over; after(step) is called between."""
-    while True:
-        page.click("#choices button.primary")
-        if not page.evaluate("document.getElementById('game').offsetParent"):
-            return  # the next page is there
-        page.wait_for_selector("#overlay", state="hidden")
-        before = page.inner_text("#episode")
-        for step in range(4):
-            if device == "phone":
-                page.tap("#pad .up")
-            else:
-                page.keyboard.press("ArrowUp")
-            page.wait_for_function(
-                "step => Number(document.getElementById('step').textContent) >= step", arg=step + 1
-            )
-            if after and step == 1:
-                after()
-                after = None
-        page.wait_for_selector("#choices button.primary:visible")
-        assert violations(page) == []
-        if "over" in page.inner_text("#detail"):
-            page.click("#choices button.primary")
-            return
-        assert page.inner_text("#episode") == before
-
-
-@pytest.mark.parametrize(("device", "scheme"), [("desktop", "light"), ("phone", "dark")])
-def test_the_example_from_consent_to_the_way_back(server, open_page, device, scheme):
-    page = open_page(device, scheme)
+def go_through(server, page, device, strategy):
+    """The example from consent to the way back; the server is killed in its middle."""
     page.goto(f"http://{server.address}/")
     heading(page, "Consent")
     assert page.is_hidden("#withdraw")
@@ -187,6 +83,7 @@ def test_the_example_from_consent_to_the_way_back(server, open_page, device, sch
         slider.press("ArrowRight")
     go(page)
     heading(page, "About you")
+    page.get_by_label("How did you find your way?").fill(strategy)
     page.get_by_label("sometimes").check()
     go(page)
     heading(page, "Thank you")
@@ -197,13 +94,64 @@ def test_the_example_from_consent_to_the_way_back(server, open_page, device, sch
     page.wait_for_url(f"{DONE}?cc=C1")
 
 
-def test_withdrawing_is_asked_twice_and_deletes(server, open_page, tmp_path):
+STRATEGIES = {"desktop": "along the upper edge", "phone": "by counting moves"}
+"""What each participant says, to be looked for in the data."""
+
+
+def test_the_example_from_consent_to_the_way_back_and_its_data(
+    server, open_page, example, tmp_path, call
+):
+    for device, scheme in [("desktop", "light"), ("phone", "dark")]:
+        go_through(server, open_page(device, scheme), device, STRATEGIES[device])
+    server.kill()
+    records, exported = tmp_path / "records", tmp_path / "exported"
+    to = ["--mode", "pilot", "--folder", records, "--out", exported]
+    status, said, error = call("study", "export", example, *to)
+    assert (status, "2 complete ones for: qbumpers report" in said) == (0, True), said + error
+    check_data(exported, people=2)
+    assert call("report", exported)[0] == 0
+    forgotten = participant_who_said(exported, STRATEGIES["desktop"])
+    traces = [forgotten.encode(), STRATEGIES["desktop"].encode()]
+    assert all(trace in bytes_under(records) for trace in traces)
+    status, said, _ = call(
+        "study", "forget", example, forgotten, "--mode", "pilot", "--out", records
+    )
+    assert (status, f"written anew without them: {exported}" in said) == (0, True)
+    for folder in (records, exported):
+        assert [trace for trace in traces if trace in bytes_under(folder)] == []
+    assert not (exported / "report.html").exists()
+    check_data(exported, people=1)
+    assert STRATEGIES["phone"].encode() in bytes_under(exported)
+    assert call("report", exported)[0] == 0
+    assert (exported / "report.html").is_file()
+
+
+def check_data(exported, people):
+    """The data set follows its specification; each participant has 2 pairs and 3 tests."""
+    assert violations(exported / "dataset") == []
+    results = qbumpers.load(exported)
+    assert results.experiment.of_participants
+    assert len(results.conditions) == people
+    assert results.episodes.height == people * (2 + 3)
+
+
+def participant_who_said(exported, text):
+    [table] = (exported / "dataset" / "data").glob("*questionnaires_data.csv")
+    [line] = [row for row in table.read_text(encoding="utf-8").splitlines() if text in row]
+    return line.partition(",")[0]
+
+
+def bytes_under(folder):
+    return b"".join(path.read_bytes() for path in folder.rglob("*") if path.is_file())
+
+
+def test_withdrawing_is_asked_twice_and_deletes(server, open_page):
     page = open_page()
     page.goto(f"http://{server.address}/")
     go(page)
     heading(page, "Instructions")
     page.click("#withdraw")
-    assert violations(page) == []
+    check_page(page, "withdraw?")
     page.click("#stay")
     page.click("#withdraw")
     page.click("#leave")
@@ -214,14 +162,14 @@ def test_withdrawing_is_asked_twice_and_deletes(server, open_page, tmp_path):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("device", SIZES)
+@pytest.mark.parametrize("device", WIDTHS)
 def test_the_researcher_sees_who_is_where(server, open_page, device, scheme):
     participant, page = open_page(), open_page(device, scheme)
     participant.goto(f"http://{server.address}/")
     go(participant)
     heading(participant, "Instructions")
     page.goto(f"http://{server.address}/researcher")
-    assert violations(page) == []
+    check_page(page, "token")
     page.fill("#token", "guess")
     page.click("#form button")
     page.wait_for_function(
@@ -232,8 +180,7 @@ def test_the_researcher_sees_who_is_where(server, open_page, device, scheme):
     page.wait_for_selector("#people tbody tr")
     assert "1 came, 1 are here now" in page.inner_text("#summary")
     assert "instructions" in page.inner_text("#people")
-    assert violations(page) == []
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    check_page(page, "overview")
     assert server.token not in page.url
     with page.expect_download() as download:
         page.click("#export")

@@ -8,6 +8,7 @@ from qbumpers.cli import fitting as fitting
 from qbumpers.cli import listing as listing
 from qbumpers.cli import play as play
 from qbumpers.cli import study as study
+from qbumpers.cli import study_data as study_data
 from qbumpers.cli import tuning as tuning
 from qbumpers.cli.application import application, main
 

@@ -119,7 +119,7 @@ def play(
     from qbumpers.play.setup import Setup
     from qbumpers.play.stores import place_of
 
-    options = dict(_options_in(context.args))
+    options = dict(options_in(context.args))
     if alpha is not None:
         options["alpha"] = alpha
     if assistant is None and not options:
@@ -151,8 +151,15 @@ def _database_at(records: str) -> str:
     return records
 
 
-def _options_in(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
-    """Names and values of an assistant's options: `--p-max 0.9`, `--p-max=0.9`, `--second`."""
+def options_in(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Names and values of an assistant's options: `--p-max 0.9`, `--p-max=0.9`, `--second`.
+
+    Args:
+        arguments: of the command, those that are none of its own.
+
+    Raises:
+        RequestError: if one of them is no option.
+    """
     waiting = list(arguments)
     while waiting:
         name = waiting.pop(0)
@@ -246,7 +253,7 @@ def export(
     check_installed()
     import_modules(imports or (), "--import")
     if records.endswith(".toml"):
-        from qbumpers.cli.study import export_data
+        from qbumpers.cli.study_data import export_data
 
         export_data(Path(records), out, mode, folder)
         return

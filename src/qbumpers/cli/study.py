@@ -1,4 +1,4 @@
-"""Commands of `qbumpers study` for studies with participants."""
+"""Commands of `qbumpers study` that make, rehearse and serve studies with participants."""
 
 import datetime
 from pathlib import Path
@@ -18,7 +18,7 @@ from qbumpers.cli.play import (
     check_installed,
     study,
 )
-from qbumpers.errors import RequestError, counted
+from qbumpers.errors import counted
 
 if TYPE_CHECKING:
     from qbumpers.study.design.models import Study
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 File = Annotated[Path, typer.Argument(help="The study file.", metavar="STUDY.toml")]
 
 
-def _say(text: str) -> None:
+def say(text: str) -> None:
+    """Print a line, whatever is in it."""
     OUTPUT.print(escape(text), soft_wrap=True)
 
 
@@ -40,7 +41,7 @@ def new_study(file: File) -> None:
     from qbumpers.study.design.sources import write_new
 
     write_new(file)
-    _say(f"{file} is written: change it, then: qbumpers study check {file}")
+    say(f"{file} is written: change it, then: qbumpers study check {file}")
 
 
 @study.command("check")
@@ -55,14 +56,14 @@ def check_study(file: File) -> None:
     design = load_study(file)
     check_playable(design)
     for line in _described(design):
-        _say(line)
+        say(line)
     _warn_of_identities(file, design)
-    _say("OK")
+    say("OK")
 
 
 def _warn_of_identities(file: Path, design: "Study") -> None:
     if datetime.datetime.now(datetime.UTC).date() > design.keep_identities_until:
-        _say(
+        say(
             f"Identities were to be kept until {design.keep_identities_until}: delete them, by "
             f"qbumpers study forget {file} --identities"
         )
@@ -99,7 +100,8 @@ Live = Annotated[
 ]
 
 
-def _folder(out: Path | None, design: "Study") -> Path:
+def folder_of(out: Path | None, design: "Study") -> Path:
+    """The folder of a study's records, results/NAME if none is given."""
     return out or Path("results") / design.name
 
 
@@ -130,13 +132,13 @@ def serve_it(
     design = load_study(file)
     setups = check_playable(design)
     _warn_of_identities(file, design)
-    mode, folder = "live" if live else "pilot", _folder(out, design)
+    mode, folder = "live" if live else "pilot", folder_of(out, design)
     served = StudyHost(design, setups, opened(file, design, setups, folder, mode), mode)
 
     def announce(url: str) -> None:
-        _say(f"The study is at {url}; the records go into {records_of(folder, mode)}")
-        _say(f"The researcher's page is at {url}researcher; its token is {served.token}")
-        _say("Ctrl-C ends it.")
+        say(f"The study is at {url}; the records go into {records_of(folder, mode)}")
+        say(f"The researcher's page is at {url}researcher; its token is {served.token}")
+        say("Ctrl-C ends it.")
 
     try:
         serve_study(served, setups, address, browser=browser, announce=announce)
@@ -165,7 +167,7 @@ def simulate_study(
 
     design = load_study(file)
     setups = check_playable(design)
-    folder = _folder(out, design)
+    folder = folder_of(out, design)
     engine = opened(file, design, setups, folder, "simulated")
     with OUTPUT.status(f"0 of {participants} participants") as status:
         done = 0
@@ -181,10 +183,8 @@ def simulate_study(
             advance=advance,
         )  # fmt: skip
     for outcome, count in sorted(found.outcomes.items()):
-        _say(f"{outcome}: {counted(count, 'participant')}")
-    _say(
-        f"{counted(found.reloads, 'reload')}; the records are in {records_of(folder, 'simulated')}"
-    )
+        say(f"{outcome}: {counted(count, 'participant')}")
+    say(f"{counted(found.reloads, 'reload')}; the records are in {records_of(folder, 'simulated')}")
 
 
 @study.command("freeze")
@@ -199,7 +199,7 @@ def freeze_study(file: File) -> None:
 
     design = load_study(file)
     digest = freeze(file, design, check_playable(design))
-    _say(f"{frozen_path(file)} and its page are written; SHA-256 {digest}")
+    say(f"{frozen_path(file)} and its page are written; SHA-256 {digest}")
 
 
 @study.command("backup")
@@ -217,9 +217,9 @@ def back_up_study(
     from qbumpers.study.design.sources import load_study
     from qbumpers.study.flow.running import back_up, records_of
 
-    folder = _folder(out, load_study(file))
+    folder = folder_of(out, load_study(file))
     back_up(records_of(folder, "live" if live else "pilot"), copy)
-    _say(f"{copy} is written")
+    say(f"{copy} is written")
 
 
 @study.command("restore")
@@ -237,152 +237,6 @@ def restore_study(
     from qbumpers.study.design.sources import load_study
     from qbumpers.study.flow.running import records_of, restore
 
-    records = records_of(_folder(out, load_study(file)), "live" if live else "pilot")
+    records = records_of(folder_of(out, load_study(file)), "live" if live else "pilot")
     restore(copy, records)
-    _say(f"{records} is as {copy}")
-
-
-Mode = Annotated[
-    str, typer.Option("--mode", help="Which records: pilot, live or simulated.", metavar="MODE")
-]
-
-
-def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
-    """Export a study: for load, report and fit, and as a Psych-DS data set.
-
-    Args:
-        file: path of the study file.
-        to: folder for the files.
-        mode: which records.
-        folder: of the records; results/NAME if None.
-    """
-    from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
-    from qbumpers.study.outcomes.export import DATASET, export_study
-
-    design = load_study(file)
-    engine = read_records(records_of(_folder(folder, design), mode))
-    found = export_study(engine, design, check_playable(design), to)
-    engine.dispose()
-    _say(f"{counted(found.participants, 'participant')} in {to / DATASET}")
-    _say(f"{counted(found.reported, 'complete one')} for: qbumpers report {to}")
-
-
-@study.command("power")
-def power_of_study(file: File, mode: Mode = "simulated", out: Folder = None) -> None:
-    """Say how many participants the planned test needs, from those of a rehearsal.
-
-    Example: qbumpers study power my-study.toml
-    """
-    check_installed()
-    from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
-    from qbumpers.study.outcomes.power import power_of
-    from qbumpers.study.outcomes.reading import read_participants
-
-    design = load_study(file)
-    engine = read_records(records_of(_folder(out, design), mode))
-    found = power_of(design, read_participants(engine, design))
-    first, second = found.analysis.arms
-    _say(
-        f"{found.analysis.measure}: {first} {found.means[0]:.1f} (n = {found.arms[0]}), {second} "
-        f"{found.means[1]:.1f} (n = {found.arms[1]}); d = {found.effect:.2f}"
-    )
-    _say("per arm   power   95% interval   without an effect")
-    plenty = next((place for place, row in enumerate(found.table) if row.power >= 0.99), None)
-    for row in found.table[: None if plenty is None else plenty + 1]:
-        _say(f"{row.size:7d}   {row.power:5.2f}   {row.low:.2f} to {row.high:.2f}   {row.null:.2f}")
-    most = found.table[-1].size
-    low, needed, high = (
-        str(n or f"more than {most}") for n in (found.low, found.needed, found.high)
-    )
-    _say(f"For power {found.analysis.power}: {needed} per arm (95% interval {low} to {high}).")
-
-
-@study.command("forget")
-def forget_participant(
-    file: File,
-    participant: Annotated[
-        str | None, typer.Argument(help="Identifier, or PROLIFIC_PID or class code.", metavar="ID")
-    ] = None,
-    identities: Annotated[
-        bool, typer.Option("--identities", help="Delete all identities instead; data stay.")
-    ] = False,
-    mode: Mode = "live",
-    out: Folder = None,
-) -> None:
-    """Delete everything of a participant, exports included, and leave a dated tombstone.
-
-    Example: qbumpers study forget my-study.toml 4f1c0a9d2b7e6c85
-    """
-    check_installed()
-    from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.forgetting import delete_identities
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
-    from qbumpers.study.outcomes.deletion import forget
-
-    if (participant is None) != identities:
-        raise RequestError("forget: give the ID of a participant, or --identities")
-    design = load_study(file)
-    engine = read_records(records_of(_folder(out, design), mode))
-    if participant is None:
-        _say(f"identities deleted: {delete_identities(engine)}; what they did stays")
-        return
-    reached = forget(engine, design, check_playable(design), participant)
-    _say("deleted; a dated tombstone says that somebody was")
-    for folder in reached:
-        _say(f"written anew without them: {folder}")
-
-
-@study.command("reconcile")
-def reconcile_study(
-    file: File,
-    table: Annotated[
-        Path, typer.Argument(help="Submissions as Prolific exports them.", metavar="TABLE.csv")
-    ],
-    mode: Mode = "live",
-    out: Folder = None,
-) -> None:
-    """Compare with Prolific's table: who completed there and not here, and the reverse.
-
-    Exit status 1 if there is any.
-
-    Example: qbumpers study reconcile my-study.toml prolific_export.csv
-    """
-    check_installed()
-    from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
-    from qbumpers.study.outcomes.reading import read_participants
-    from qbumpers.study.outcomes.recruitment import identities_in, reconcile
-
-    design = load_study(file)
-    engine = read_records(records_of(_folder(out, design), mode))
-    everybody = read_participants(engine, design)
-    found = reconcile(design, everybody, identities_in(engine), table)
-    for each in found:
-        _say(f"{each.identity}: there {each.there}; here {each.here}")
-    if found:
-        raise typer.Exit(1)
-    _say("OK: both say the same")
-
-
-@study.command("bonus")
-def bonus_of_study(file: File, mode: Mode = "live", out: Folder = None) -> None:
-    """Print the bonuses by the rule of the study, as Prolific takes them.
-
-    Example: qbumpers study bonus my-study.toml
-    """
-    check_installed()
-    from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
-    from qbumpers.study.outcomes.reading import read_participants
-    from qbumpers.study.outcomes.recruitment import bonus_table, identities_in
-
-    design = load_study(file)
-    engine = read_records(records_of(_folder(out, design), mode))
-    print(bonus_table(design, read_participants(engine, design), identities_in(engine)), end="")
+    say(f"{records} is as {copy}")

@@ -125,7 +125,8 @@ export class ProjectedCurve {
   }
 }
 
-function axes(label) {
+// Two axes, the first of whole numbers from 1.
+export function axes(label) {
   const look = { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
   const whole = (_, ticks) => ticks.map((tick) => (Number.isInteger(tick) && tick > 0 ? String(tick) : ""));
   return [{ ...look, values: whole, label, labelSize: 18, size: 28, labelFont: "12px system-ui" }, { ...look, size: 46 }];

@@ -68,12 +68,13 @@ function labelled(item, input) {
 
 // Nothing is answered until it is touched: a slider that starts in the middle is no answer.
 function slider(item, id, words) {
-  const input = element("input", { type: "range", id, min: item.least, max: item.most, step: item.step });
+  const input = element("input", { type: "range", id, className: "untouched", min: item.least, max: item.most, step: item.step });
   input.value = (item.least + item.most) / 2;
   let touched = false;
   const value = element("span", { className: "value" }, words.choose);
   const touch = () => {
     touched = true;
+    input.className = "";
     value.textContent = input.value;
   };
   for (const kind of ["input", "click", "keyup"]) input.addEventListener(kind, (event) => event.key !== "Tab" && touch());

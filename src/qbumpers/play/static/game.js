@@ -131,6 +131,7 @@ export class Game {
   }
 
   cover(headline, detail, choices, light = false) {
+    byId("override").hidden = true; // it would lie over the question
     byId("headline").textContent = headline;
     byId("headline").hidden = !headline;
     byId("detail").textContent = detail;

@@ -1,10 +1,11 @@
 // The researcher's page: asks for the token, which is sent in a header, and shows what it gets.
 
+import { axes } from "./curve.js";
 import { byId, colour, element, shown } from "./dom.js";
 import uPlot from "./uplot/uPlot.esm.js";
 
 const EVERY = 5000; // milliseconds
-const COLOURS = ["--accent", "--warm", "--good", "--quiet"];
+const COLOURS = ["--accent", "--warm", "--good", "--purple", "--teal", "--red", "--olive", "--quiet"];
 
 let token = "";
 let timer = 0;
@@ -70,9 +71,8 @@ function draw(curves) {
   const data = series.map(({ condition, assisted }) => episodes.map((episode) => (
     curves.find((row) => row.condition === condition && row.assisted === assisted && row.episode === episode)?.mean ?? null
   )));
-  const axis = { stroke: colour("--quiet"), grid: { stroke: colour("--line") } };
   new uPlot({
-    width: place.clientWidth, height: 260, cursor: { show: false }, scales: { x: { time: false } }, axes: [axis, axis],
+    width: place.clientWidth, height: 260, cursor: { show: false }, legend: { live: false }, scales: { x: { time: false } }, axes: axes("episode"),
     series: [{ label: "episode" }, ...series.map(({ condition, assisted, number }) => ({
       label: `${condition}, ${assisted ? "assisted" : "probe"}`, stroke: colour(COLOURS[number % COLOURS.length]),
       width: 2, dash: assisted ? [] : [6, 4], spanGaps: true,

@@ -96,7 +96,9 @@ function button(text, act, primary = true) {
   return made;
 }
 
-const buttons = (...made) => byId("form").append(element("div", { className: "choices" }, ...made));
+function buttons(...made) {
+  byId("form").append(element("div", { className: "choices" }, ...made));
+}
 
 function plain() {
   buttons(button(words.next));
@@ -228,6 +230,7 @@ function stop(text, label) {
 
 function askForCode(wrong = "") {
   stop(wrong, words.enter);
+  byId("link").textContent = "";
   byId("heading").textContent = words.enter_code;
   const input = element("input", { type: "text", id: "own-code", value: arrival.code ?? "" });
   input.setAttribute("aria-labelledby", "heading");
