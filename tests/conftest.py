@@ -75,16 +75,3 @@ def call(monkeypatch, capsys):
         return leaving.value.code or 0, plain(output), plain(errors)
 
     return run
-
-
-@pytest.fixture(scope="session")
-def browser():
-    """A real browser: one for all, as Playwright runs once in a process."""
-    found = shutil.which("chromium")
-    if found is None:
-        pytest.skip("chromium is not installed: .ci/install_browser")
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=found, headless=True, args=FLAGS)
-        yield browser
-        browser.close()
