@@ -48,7 +48,13 @@ def test_every_rule_has_options_to_be_tried_with():
     assert set(EXAMPLES) == set(assistants())
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+SHARED = "model-free-learner-aware-bumpers"  # nearly all of it is learner-aware bumpers
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] if n == SHARED else []) for n in EXAMPLES],
+)
 def test_a_rule_does_the_same_in_every_host(name):
     assistant = make_assistant(name, **EXAMPLES[name])
     tables = [task for task in small_tasks(assistant) if task.states]

@@ -49,6 +49,7 @@ def test_a_table_is_checked_against_the_exact_solution(call):
     assert "the error is at most 0.25, its mean 0.25" in output
 
 
+@pytest.mark.slow
 def test_training_keeps_the_best_with_its_record_and_all_seeds(call, tmp_path):
     status, output, errors = call("expert", *QUICK, "--out", "expert.npz")
     assert status == 0
