@@ -1,11 +1,11 @@
 """Learner steps per second on a graphics card, against all cores and against a plain kernel.
 
-The rate of a card is that of its kernel alone, and beside it that of `simulate` as a whole, which
-also draws seeds and brings every episode's outcomes back.
+The rate of a card is that of its kernel alone, and beside it that of `simulate_means` as a whole,
+which also draws seeds and averages. Everything is compiled before anything is timed.
 """
 
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from measuring import Row, Target, Timed, alternate, compared, is_quick, show
@@ -23,8 +23,8 @@ TASKS = {"cliff-walking": 0.0, "taxi": -20.0, "frozen-lake": 0.0}
 SHARES = {"float32": 0.5, "float64": 0.2}
 """Of the plain kernel's rate that the package is to reach with bumpers at Cliff Walking."""
 
-_TRIALS, _HERE = 1 << 17, 2_000  # on a card, on the cores of this machine
-_FULL = (_TRIALS, 100, 3)  # trials, episodes, rounds
+_FEWER = 8  # times fewer trials of the heaviest rule, and again on the cores of this machine
+_FULL = (1 << 17, 100, 3)  # trials, episodes, rounds
 _QUICK = (8, 1, 1)
 _STANDARD_ERRORS = 4
 
@@ -47,13 +47,16 @@ def conditions(task: str, episodes: int) -> dict[str, Condition]:
 
 
 def whole(condition: Condition, trials: int, card: Card) -> Timed:
-    """Million steps per second of `simulate` on a card."""
-    run(condition, trials=trials, card=card)
+    """Million steps per second of what `simulate_means` does on a card."""
+    from qbumpers.simulation.cuda.engine import run_means
+
+    run_means(condition, range(1), 0, card)
 
     def timed(seed: int) -> float:
         begin = time.perf_counter()
-        simulation = run(condition, trials=trials, seed=seed, card=card)
-        return simulation.steps / (time.perf_counter() - begin) / 1e6
+        means = run_means(condition, range(trials), seed, card)
+        steps = (means.assisted_length + means.unassisted_length).sum() * condition.episodes
+        return float(steps) / (time.perf_counter() - begin) / 1e6
 
     return timed
 
@@ -68,13 +71,15 @@ def kernel(condition: Condition, trials: int, card: Card) -> Timed:
 
     def launched(trials: int, seed: int) -> tuple[Any, float]:
         with cards.chosen(card):
-            arguments: Any = kernel_arguments(
-                condition, begun, [range(trials)], seed, cards.own_arrays, cards.empty_array
+            arguments: Any = cards.sent(
+                kernel_arguments(
+                    condition, begun, [range(trials)], seed, cards.own_arrays, cards.empty_array
+                )
             )
             started = time.perf_counter()
-            *_, sinks, _ = cards.launch(begun.space, arguments, trials)
+            cards.launch(begun.space, arguments, trials)
             seconds = time.perf_counter() - started
-            return cards.returned(sinks.outcomes), seconds
+            return cards.returned(arguments[-2].outcomes), seconds
 
     launched(1, 0)  # compiles
 
@@ -98,52 +103,59 @@ def here(condition: Condition, trials: int) -> Timed:
     return timed
 
 
-def against_cores(task: str, quick: bool, number: int) -> list[Row]:
+class Prepared(NamedTuple):
+    """What is to be timed of one condition, compiled.
+
+    Attributes:
+        name: of the condition.
+        baseline: of `timed`, in words.
+        timed: by name; the baseline too.
+        target: of a row, as a share of the baseline's rate; None if there is none.
+    """
+
+    name: str
+    baseline: str
+    timed: dict[str, Timed]
+    target: float | None = None
+
+
+def against_cores(task: str, quick: bool, number: int) -> list[Prepared]:
     """A card against all cores, in both precisions."""
-    rows = []
-    trials, episodes, rounds = _QUICK if quick else _FULL
+    found = []
+    trials, episodes, _ = _QUICK if quick else _FULL
     for name, condition in conditions(task, episodes).items():
         if quick and name == "learner-aware":
             continue
-        timed = {"cores": here(condition, min(trials, _HERE))}
+        many = trials // _FEWER if name == "learner-aware" else trials
+        timed = {"all cores": here(condition, many // _FEWER)}
         for precision in SHARES:
             card = Card(number, precision)  # type: ignore[arg-type]
-            timed[f"kernel, {precision}"] = kernel(condition, trials, card)
-            timed[f"simulate, {precision}"] = whole(condition, trials, card)
-        rates = alternate(timed, rounds)
-        cores = rates.pop("cores")
-        rows += [
-            compared(f"{task}, {name}, {what}", rate, UNIT, "all cores", cores)
-            for what, rate in rates.items()
-        ]
-    return rows
+            timed[f"kernel, {precision}"] = kernel(condition, many, card)
+            timed[f"means, {precision}"] = whole(condition, many, card)
+        found.append(Prepared(f"{task}, {name}", "all cores", timed))
+    return found
 
 
-def against_plain_kernel(quick: bool, number: int) -> list[Row]:
+def against_plain_kernel(quick: bool, number: int) -> list[Prepared]:
     """Bumpers at Cliff Walking against a kernel written by hand for them."""
     import plain_gpu
 
-    trials, episodes, rounds = _QUICK if quick else _FULL
-    rows = []
+    trials, episodes, _ = _QUICK if quick else _FULL
+    found = []
     bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
     condition = make_condition("cliff-walking", bumpers, episodes=episodes)
     for precision, share in SHARES.items():
-        found = plain_gpu.run(trials, episodes, 0.7, precision)
-        _check_agreement(found, condition, trials, Card(number, precision))  # type: ignore[arg-type]
+        by_hand = plain_gpu.run(trials, episodes, 0.7, precision)
+        _check_agreement(by_hand, condition, trials, Card(number, precision))  # type: ignore[arg-type]
 
         def plain(_: int, kind: str = precision) -> float:
             one = plain_gpu.run(trials, episodes, 0.7, kind)
             return one.steps / one.seconds / 1e6
 
         ours = kernel(condition, trials, Card(number, precision))  # type: ignore[arg-type]
-        rates = alternate({"ours": ours, "plain": plain}, rounds)
-        target = Target(share * float(np.median(rates["plain"])), at_least=True)
-        rows.append(
-            compared(
-                f"bumpers, {precision}", rates["ours"], UNIT, "plain kernel", rates["plain"], target
-            )
-        )
-    return rows
+        timed = {"plain kernel": plain, f"kernel, {precision}": ours}
+        found.append(Prepared("cliff-walking, bumpers", "plain kernel", timed, share))
+    return found
 
 
 def _check_agreement(found: Any, condition: Condition, trials: int, card: Card) -> None:
@@ -171,8 +183,24 @@ def measure(quick: bool) -> list[Row]:
         return []
     number = card.number if card else 0
     tasks = list(TASKS)[:1] if quick else list(TASKS)
-    rows = against_plain_kernel(quick, number)
-    return rows + [row for task in tasks for row in against_cores(task, quick, number)]
+    prepared = against_plain_kernel(quick, number)
+    for task in tasks:
+        prepared += against_cores(task, quick, number)
+    rounds = (_QUICK if quick else _FULL)[-1]
+    return [row for each in prepared for row in _rows(each, rounds)]
+
+
+def _rows(prepared: Prepared, rounds: int) -> list[Row]:
+    name, baseline, timed, share = prepared
+    rates = alternate(timed, rounds)
+    compared_with = rates.pop(baseline)
+    target = None
+    if share is not None:
+        target = Target(share * float(np.median(compared_with)), at_least=True)
+    return [
+        compared(f"{name}, {what}", rate, UNIT, baseline, compared_with, target)
+        for what, rate in rates.items()
+    ]
 
 
 if __name__ == "__main__":

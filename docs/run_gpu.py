@@ -1,10 +1,10 @@
 """Measure a graphics card: `python docs/run_gpu.py [PART ...]`, some minutes on a large card.
 
-Three parts: `agreement`, in how many of 10,000 trials a step is another one than on the processor,
-and whether means agree; `benchmark`, benchmarks/gpu.py; `map`, the hypervolume of bumpers over
-`v_min` and `p_max`, with all alphas in it, at a hundred thousand learners per point. Numbers are
-kept in docs/data/gpu, the map in docs/images/gpu-map.png. `--quick` shows that it runs, with a
-simulated card too.
+Four parts: `agreement`, in how many of 10,000 trials a step is another one than on the processor,
+and whether means agree; `benchmark`, benchmarks/gpu.py; `divergence`, benchmarks/divergence.py;
+`map`, the hypervolume of bumpers over `v_min` and `p_max`, with all alphas in it, at a hundred
+thousand learners per point. Numbers are kept in docs/data/gpu, the map in docs/images/gpu-map.png.
+`--quick` shows that it runs, with a simulated card too.
 """
 
 import argparse
@@ -19,10 +19,14 @@ import numpy as np
 
 from qbumpers import make_assistant, make_task, simulate, solve
 from qbumpers.analysis.hypervolume import hypervolume
-from qbumpers.simulation import Card, device_of, make_condition
+from qbumpers.learners import make_learner
+from qbumpers.simulation import Card, device_of, make_condition, simulate_means
 
 FOLDER = Path(__file__).parent
 SEED = 17
+LEARNERS = ("q-learning", "two-rate", "softmax-q-learning")
+"""That are compared step by step: without exponentials, and with them in every choice."""
+
 ALPHAS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 FLOORS = (-400.0, -200.0, -100.0, -50.0, 0.0, 40.0)
 SURE = (0.6, 0.8, 0.9, 0.99, 0.999, 0.9999)
@@ -56,9 +60,13 @@ def agreement(size: Size, card: Card) -> dict[str, Any]:
     from qbumpers.simulation.cuda.agreement import agreement as compared
 
     bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
-    condition = make_condition("cliff-walking", bumpers, episodes=min(size.episodes, 20))
-    found = {"steps": compared(condition, size.agreement, SEED, card)._asdict()}
-    print(f"{found['steps']['parted']} of {found['steps']['trials']} trials part")
+    found: dict[str, Any] = {}
+    for name in LEARNERS:
+        condition = make_condition(
+            "cliff-walking", bumpers, learner=make_learner(name), episodes=min(size.episodes, 20)
+        )
+        found[name] = compared(condition, size.agreement, SEED, card)._asdict()
+        print(f"{name}: {found[name]['parted']} of {size.agreement} trials part")
     for precision, device in (("float64", "processor"), ("float64", "gpu"), ("float32", "gpu")):
         outcomes = simulate(
             "cliff-walking", bumpers, trials=size.agreement, seed=SEED, device=device,
@@ -72,12 +80,12 @@ def agreement(size: Size, card: Card) -> dict[str, Any]:
     return found
 
 
-def benchmark(quick: bool) -> dict[str, Any]:
-    """The rows of benchmarks/gpu.py."""
+def benchmark(name: str, title: str, quick: bool) -> dict[str, Any]:
+    """The rows of a benchmark."""
     sys.path.insert(0, str(FOLDER.parent / "benchmarks"))
-    gpu, measuring = importlib.import_module("gpu"), importlib.import_module("measuring")
-    rows = gpu.measure(quick)
-    measuring.show("On a graphics card", rows)
+    measured, measuring = importlib.import_module(name), importlib.import_module("measuring")
+    rows = measured.measure(quick)
+    measuring.show(title, rows)
     return {"rows": [{**row._asdict(), "ratios": list(row.ratios)} for row in rows]}
 
 
@@ -107,11 +115,11 @@ def map_of_bumpers(size: Size) -> dict[str, Any]:
 
 
 def _point(size: Size, name: str, options: dict[str, float]) -> tuple[float, float]:
-    outcomes = simulate(
+    means = simulate_means(
         "cliff-walking", make_assistant(name, **options), trials=size.learners, seed=SEED,
         device="gpu", episodes=size.episodes,
-    ).outcomes  # fmt: skip
-    return float(outcomes.assisted_return.mean()), float(outcomes.unassisted_return.mean())
+    )  # fmt: skip
+    return float(means.assisted_return.mean()), float(means.unassisted_return.mean())
 
 
 def _draw(size: Size, shares: np.ndarray) -> None:
@@ -141,7 +149,7 @@ def _folder(size: Size) -> Path:
 def main() -> None:
     """Measure, print, and keep the numbers."""
     arguments = argparse.ArgumentParser(description=__doc__)
-    parts = ("agreement", "benchmark", "map")
+    parts = ("agreement", "benchmark", "divergence", "map")
     arguments.add_argument("parts", nargs="*", metavar="PART", help=", ".join(parts))
     arguments.add_argument("--quick", action="store_true", help="small, to see that it runs")
     given = arguments.parse_args()
@@ -153,7 +161,8 @@ def main() -> None:
     size = QUICK if given.quick else Size()
     work = {
         "agreement": lambda: agreement(size, card),
-        "benchmark": lambda: benchmark(given.quick),
+        "benchmark": lambda: benchmark("gpu", "On a graphics card", given.quick),
+        "divergence": lambda: benchmark("divergence", "Episodes of unequal length", given.quick),
         "map": lambda: map_of_bumpers(size),
     }
     folder = _folder(size) / "data" / "gpu"

@@ -13,13 +13,12 @@ import polars as pl
 from qbumpers.analysis.frontier import is_optimal, optimal_probability
 from qbumpers.analysis.hypervolume import Hypervolumes, compare_hypervolumes, hypervolume
 from qbumpers.analysis.measures import MEASURES, trial_samples
-from qbumpers.analysis.resampling import resampled_means, stratified_interval
+from qbumpers.analysis.resampling import interquartile_interval, resampled_means
 from qbumpers.analysis.statistics import (
     IntervalEstimate,
     bonferroni,
     difference,
     holm,
-    interquartile_mean,
     percentile_interval,
     probability_of_improvement,
 )
@@ -127,10 +126,7 @@ def pooled(
         **_columns("macro", (_macro(v, generator, paired) for v in strata.values())),
         **_columns(
             "interquartile",
-            (
-                stratified_interval(v, interquartile_mean, generator, paired)
-                for v in strata.values()
-            ),
+            (interquartile_interval(v, generator, paired) for v in strata.values()),
         ),
     }
     return _with_numbers(pl.DataFrame({"assistant": list(strata)}), columns)

@@ -179,7 +179,8 @@ def _about(
 
 
 def _same_trials(trials: pl.DataFrame) -> bool:
-    return len({tuple(part["trial"]) for part in trials.partition_by("condition")}) == 1
+    first, *others = (part["trial"] for part in trials.partition_by("condition"))
+    return all(first.equals(other) for other in others)
 
 
 def _control(table: pl.DataFrame) -> str | None:

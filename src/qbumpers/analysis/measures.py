@@ -153,10 +153,12 @@ def trial_samples(trials: pl.DataFrame, *measures: str) -> dict[str, np.ndarray]
         float64 [T, M] by condition, in the order of the experiment, trials by number; NaN if a
         measure is unknown.
     """
-    found = trials.group_by("condition", maintain_order=True).agg(
-        pl.col(measures).cast(pl.Float64).sort_by("trial")
-    )
-    return {name: np.array(values, np.float64).T for name, *values in found.iter_rows()}
+    chosen = trials.select("condition", "trial", pl.col(measures).cast(pl.Float64))
+    parts = chosen.partition_by("condition", maintain_order=True)
+    return {
+        part["condition"][0]: part.sort("trial").select(measures).fill_null(np.nan).to_numpy()
+        for part in parts
+    }
 
 
 def summary(

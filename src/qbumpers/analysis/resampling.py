@@ -2,6 +2,9 @@
 
 A number such as the best of several means comes out too high, since chance picks the best; the
 bootstrap repeats that and, added naively, doubles it. `function_interval` takes it off instead.
+
+Of more than 10,000 trials, groups are resampled in the place of single ones: since trials are
+independent, 2,000 groups say within 2% by how much the mean of all trials varies.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,10 +15,16 @@ from qbumpers.analysis.statistics import (
     CONFIDENCE,
     RESAMPLES,
     IntervalEstimate,
+    interquartile_influence,
+    interquartile_mean,
     percentile_interval,
 )
 from qbumpers.errors import RequestError
 
+MANY = 10_000
+"""Trials above which groups of them are resampled."""
+
+_GROUPS = 2_000
 _BLOCK = 2**22  # numbers held at once
 
 _DILATIONS = (1.0, 0.1, 4.0)
@@ -43,12 +52,15 @@ def _counts(trials: int, resamples: int, generator: np.random.Generator) -> np.n
 
 
 def _means(samples: np.ndarray, resamples: int, generator: np.random.Generator) -> np.ndarray:
-    """Means [B, M] of resampled trials of samples [T, M]."""
+    """Means [B, M] of resampled trials of samples [T, M], or of groups of them if they are many."""
     trials = len(samples)
-    parts = [
-        _counts(trials, block, generator) @ samples / trials for block in _blocks(resamples, trials)
-    ]
-    return np.concatenate(parts)
+    if trials <= MANY:
+        counts = (_counts(trials, block, generator) for block in _blocks(resamples, trials))
+        return np.concatenate([block @ samples / trials for block in counts])
+    first = np.linspace(0, trials, _GROUPS, endpoint=False).astype(int)
+    sums, sizes = np.add.reduceat(samples, first), np.diff(first, append=trials)
+    counts = _counts(_GROUPS, resamples, generator)
+    return counts @ sums / (counts @ sizes)[:, np.newaxis]
 
 
 def resampled_means(
@@ -159,6 +171,32 @@ def stratified_interval(
     pooled = (_pooled(strata, block, generator, paired) for block in blocks)
     replicates = np.concatenate([statistic(values) for values in pooled])
     return percentile_interval(found, replicates, confidence)
+
+
+def interquartile_interval(
+    strata: Sequence[np.ndarray], generator: np.random.Generator, paired: bool = False
+) -> IntervalEstimate:
+    """The interquartile mean of pooled conditions, as `stratified_interval` has it.
+
+    Of many trials the bootstrap is that of its linear part, the mean of what each trial adds to it.
+
+    Args:
+        strata: float64 [T] of each condition.
+        generator: draws the resamples.
+        paired: draw the same trials in all conditions (common random numbers).
+
+    Raises:
+        RequestError: if pairs are asked for and the numbers of trials differ.
+    """
+    if max(map(len, strata)) <= MANY:
+        return stratified_interval(strata, interquartile_mean, generator, paired)
+    pooled, ends = np.concatenate(strata), np.cumsum([len(values) for values in strata])
+    found = float(interquartile_mean(pooled))
+    if min(map(len, strata)) < 2:
+        return IntervalEstimate(found, float("nan"), float("nan"))
+    influence = np.split(interquartile_influence(pooled)[:, np.newaxis], ends[:-1])
+    means = resampled_means(influence, generator, paired)[..., 0]
+    return percentile_interval(found, found + means @ np.diff(ends, prepend=0) / ends[-1])
 
 
 def _pooled(

@@ -214,6 +214,22 @@ def interquartile_mean(samples: np.ndarray, axis: int = -1) -> np.ndarray:
     return np.asarray(middle.take(range(cut, trials - cut), axis=axis).mean(axis=axis))
 
 
+def interquartile_influence(samples: np.ndarray) -> np.ndarray:
+    """What each sample adds to the interquartile mean of all of them.
+
+    Its influence function (Huber, Robust Statistics, 1981, Section 3.3): the mean of these numbers
+    over resampled samples is, to first order, how far their interquartile mean lies from this one.
+
+    Args:
+        samples: float64 [T].
+
+    Returns:
+        float64 [T], with mean 0.
+    """
+    within = np.clip(samples, *np.quantile(samples, (0.25, 0.75)))
+    return 2 * (within - within.mean())
+
+
 def bootstrap_interval(
     samples: Sequence[np.ndarray],
     statistic: Callable[..., np.ndarray],

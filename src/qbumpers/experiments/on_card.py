@@ -1,11 +1,14 @@
 """Cells on a graphics card: all of a condition together, for a card has many more threads."""
 
-from collections.abc import Generator
+from collections import deque
+from collections.abc import Generator, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 
+from qbumpers.cores import usable_cores
 from qbumpers.experiments.cells import Cell
 from qbumpers.experiments.plan import Plan
 from qbumpers.experiments.work import Finished, finished
-from qbumpers.simulation import Card, run_on_card
+from qbumpers.simulation import Card, Simulation, run_on_card
 
 
 class GraphicsCard:
@@ -29,6 +32,21 @@ class GraphicsCard:
         Yields:
             Finished cells; a closed generator leaves what has begun unfinished.
         """
+        cores = usable_cores()
+        with ThreadPoolExecutor(cores) as pool:
+            waiting = deque[Future[Finished]]()
+            for cell, simulation in self._simulated(plan, seconds):
+                condition = plan.conditions[cell.content]
+                waiting.append(pool.submit(finished, condition, cell, simulation))
+                # The card does not run so far ahead that memory fills with what is not encoded.
+                while waiting and (waiting[0].done() or len(waiting) > 2 * cores):
+                    yield waiting.popleft().result()
+            for work in waiting:
+                yield work.result()
+
+    def _simulated(
+        self, plan: Plan, seconds: dict[Cell, float]
+    ) -> Iterator[tuple[Cell, Simulation]]:
         cells: dict[str, list[Cell]] = {}
         for cell in seconds:
             cells.setdefault(cell.content, []).append(cell)
@@ -36,5 +54,4 @@ class GraphicsCard:
             condition = plan.conditions[content]
             groups = [range(cell.first, cell.end) for cell in alike]
             found = run_on_card(condition, groups, plan.experiment.seed, self.card)
-            for cell, simulation in zip(alike, found, strict=True):
-                yield finished(condition, cell, simulation)
+            yield from zip(alike, found, strict=True)

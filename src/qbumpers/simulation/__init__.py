@@ -2,7 +2,7 @@
 
 from qbumpers.simulation.condition import Condition, Setup, make_condition
 from qbumpers.simulation.cuda.devices import Card, device_of
-from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts
+from qbumpers.simulation.outcomes import Outcomes, Script, Simulation, StateCounts, TrialMeans
 from qbumpers.simulation.trials import (
     check_for_card,
     engine_of,
@@ -11,6 +11,7 @@ from qbumpers.simulation.trials import (
     run,
     run_on_card,
     simulate,
+    simulate_means,
 )
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Setup",
     "Simulation",
     "StateCounts",
+    "TrialMeans",
     "check_for_card",
     "device_of",
     "engine_of",
@@ -30,4 +32,5 @@ __all__ = [
     "run",
     "run_on_card",
     "simulate",
+    "simulate_means",
 ]

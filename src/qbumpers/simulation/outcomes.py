@@ -29,6 +29,36 @@ class Outcomes(NamedTuple):
     unassisted_events: np.ndarray
 
 
+class TrialMeans(NamedTuple):
+    """Means of each trial over its training episodes: float64 [T], see `Outcomes`.
+
+    Attributes:
+        assisted_return: of the assisted episodes.
+        unassisted_return: of the greedy unassisted ones.
+        assisted_length: in steps.
+        unassisted_length: in steps.
+        overrides: in steps.
+    """
+
+    assisted_return: np.ndarray
+    unassisted_return: np.ndarray
+    assisted_length: np.ndarray
+    unassisted_length: np.ndarray
+    overrides: np.ndarray
+
+
+def trial_means(outcomes: Outcomes, training: int) -> TrialMeans:
+    """Means of each trial.
+
+    Args:
+        outcomes: by trial and episode.
+        training: how many of the episodes, from the first one on, are training.
+    """
+    return TrialMeans(
+        *(getattr(outcomes, name)[:, :training].mean(axis=1) for name in TrialMeans._fields)
+    )
+
+
 class StateCounts(NamedTuple):
     """How often each state was acted in, over all trials and episodes.
 

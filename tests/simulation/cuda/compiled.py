@@ -12,11 +12,11 @@ from numba.cuda.cudadrv import nvvm
 
 from qbumpers.simulation import Condition
 from qbumpers.simulation.cuda.block import Begun, begin
-from qbumpers.simulation.cuda.card import types_on_card
+from qbumpers.simulation.cuda.card import rounding_products, types_on_card
 from qbumpers.simulation.cuda.devices import Precision
 from qbumpers.simulation.cuda.engine import kernel_arguments
 from qbumpers.simulation.cuda.kernel import trial_of_thread
-from qbumpers.simulation.cuda.layout import LANES, Far
+from qbumpers.simulation.cuda.layout import Far, of_all
 
 cuda: Any = numba_cuda
 dispatcher: Any = numba_dispatcher
@@ -36,7 +36,7 @@ class Kernel(NamedTuple):
 
 
 def own_arrays(first, groups):
-    return Far(np.broadcast_to(first[..., None], (groups, *first.shape, LANES)).copy())
+    return Far(of_all(first, groups))
 
 
 def empty_array(shape, kind):
@@ -49,7 +49,7 @@ def compile_kernel(
     begun = begin(condition, precision, recorded)
     arguments = kernel_arguments(condition, begun, [trials], seed, own_arrays, empty_array)
     kinds = types_on_card(arguments)
-    with _without_card() as modules:
+    with _without_card() as modules, rounding_products():
         ptx, _ = cuda.compile_ptx(trial_of_thread(begun.space), kinds, cc=COMPUTE_CAPABILITY)
     return Kernel(ptx, modules[-1], arguments, kinds, begun)
 

@@ -14,7 +14,7 @@ from numba.core import types
 
 from qbumpers.decisions import Step
 from qbumpers.simulation.cuda.card import THREADS
-from qbumpers.simulation.cuda.layout import LANES
+from qbumpers.simulation.cuda.layout import of_one
 from tests.narrowing import present
 
 _MATHS = {"exp": 1, "log": 1, "pow": 2, "fmax": 2, "fmin": 2, "floor": 1}
@@ -63,7 +63,7 @@ def steps_of_trials(sinks):
         return []
     lengths = sinks.outcomes.assisted_length.sum(axis=1)
     return [
-        Step(*(far.arrays[trial // LANES, :length, ..., trial % LANES] for far in sinks.record))
+        Step(*(of_one(far.arrays, trial)[:length] for far in sinks.record))
         for trial, length in enumerate(lengths)
     ]
 

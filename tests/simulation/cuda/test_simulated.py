@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from qbumpers.experiments.on_card import GraphicsCard  # noqa: E402
 from qbumpers.experiments.plan import make_plan  # noqa: E402
 from qbumpers.experiments.work import finish  # noqa: E402
 from qbumpers.reproduction.experiments import reproduction  # noqa: E402
-from qbumpers.simulation import Card, make_condition, run, tabular  # noqa: E402
+from qbumpers.simulation import Card, make_condition, run, simulate_means, tabular  # noqa: E402
 from qbumpers.simulation.cuda import agreement as agreement_module  # noqa: E402
 from qbumpers.simulation.cuda import engine  # noqa: E402
 from qbumpers.simulation.cuda.agreement import agreement  # noqa: E402
@@ -88,6 +89,17 @@ def test_simulate_on_a_card_is_simulate_on_the_processor():
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize("most", [2, 100])
+def test_means_found_on_a_card_are_those_of_its_episodes(monkeypatch, most):
+    monkeypatch.setattr(engine, "_MOST_TRIALS", most)
+    setup: dict[str, Any] = {"trials": 5, "episodes": 3, "retention": 2, "seed": 1}
+    means = simulate_means("frozen-lake", "none", device="gpu", **setup)
+    outcomes = qbumpers.simulate("frozen-lake", "none", **setup).outcomes
+    for name, found in means._asdict().items():
+        expected = getattr(outcomes, name)[:, :3].mean(axis=1)
+        np.testing.assert_allclose(found, expected, rtol=1e-15)
+
+
 @pytest.mark.parametrize(
     ("register", "message"),
     [
@@ -121,8 +133,8 @@ def test_a_trial_that_comes_to_no_end_is_done_by_the_processor(monkeypatch):
     launch = engine.cards.launch
 
     def without_the_second(space, arguments, trials):
-        sent = launch(space, arguments, trials)
-        *_, sinks, found = sent
+        launch(space, arguments, trials)
+        *_, sinks, found = arguments
         assert found.finished.all()
         lost = range(1, 2)
         counts = present(run(condition, trials=lost).counts)
@@ -131,13 +143,14 @@ def test_a_trial_that_comes_to_no_end_is_done_by_the_processor(monkeypatch):
         found.finished[1] = 0
         for array in sinks.outcomes:
             array[1] = 0
-        return sent
 
     monkeypatch.setattr(engine.cards, "launch", without_the_second)
     found, expected = (run(condition, trials=3, card=card) for card in (CARD, None))
     parts = [(*each.outcomes, *present(each.counts)) for each in (found, expected)]
     for one, other in zip(*parts, strict=True):
         np.testing.assert_array_equal(one, other)
+    means = engine.run_means(condition, range(3), 0, CARD)
+    np.testing.assert_allclose(means.overrides, expected.outcomes.overrides.mean(axis=1))
 
 
 def test_a_learner_that_draws_what_it_begins_with_is_refused():
@@ -199,8 +212,9 @@ def test_the_script_that_measures_a_card_runs():
     root = Path(__file__).parents[3]
     command = [sys.executable, "docs/run_gpu.py", "--quick"]
     finished = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    assert "0 of 2 trials part" in finished.stdout
-    assert "bumpers, float32" in finished.stdout
+    assert "two-rate: 0 of 2 trials part" in finished.stdout
+    assert "plain kernel: " in finished.stdout
+    assert "cliff-walking, persistent" in finished.stdout
     assert "4 points of 4 learners" in finished.stdout
 
 

@@ -15,12 +15,15 @@ import numpy as np
 from numba import cuda as numba_cuda
 from numba import typeof
 from numba.core import config, types
+from numba.cuda.cudadrv import nvvm as numba_nvvm
 
 from qbumpers.simulation.cuda.devices import Card
 from qbumpers.simulation.cuda.kernel import trial_of_thread
-from qbumpers.simulation.cuda.layout import LANES, WORD, Far, Space, changed
+from qbumpers.simulation.cuda.layout import LANES, WORD, Far, Space, changed, of_all, room_for_all
+from qbumpers.simulation.outcomes import Outcomes, TrialMeans
 
 cuda: Any = numba_cuda
+nvvm: Any = numba_nvvm
 
 SIMULATED: bool = bool(config.ENABLE_CUDASIM)  # type: ignore[attr-defined]
 
@@ -66,13 +69,22 @@ def own_arrays(first: np.ndarray, groups: int) -> Far:
         first: what that is.
         groups: of `LANES` trials.
     """
-    shape = (groups, *first.shape, LANES)
     if SIMULATED:
-        return Far(np.broadcast_to(first[..., None], shape).copy())
+        return Far(of_all(first, groups))
+    shape = room_for_all(first.shape, groups)
     arrays = cuda.device_array(math.prod(shape), first.dtype)
-    blocks = -(-arrays.size // THREADS)
-    _spread[blocks, THREADS](cuda.to_device(first.reshape(-1)), arrays)
+    blocks, row = -(-arrays.size // THREADS), first.shape[-1] if first.ndim > 1 else 1
+    with _unwarned():
+        _spread[blocks, THREADS](cuda.to_device(first.reshape(-1)), row, arrays)
     return Far(arrays.reshape(shape))
+
+
+@contextlib.contextmanager
+def _unwarned() -> Iterator[None]:
+    """Within the block, few threads are no fault: there are as many as trials."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*Grid size .* low occupancy")  # in colour, perhaps
+        yield
 
 
 def empty_array(shape: tuple[int, ...], kind: Any) -> Any:
@@ -81,33 +93,66 @@ def empty_array(shape: tuple[int, ...], kind: Any) -> Any:
 
 
 @cuda.jit
-def _spread(first: Any, arrays: Any) -> None:
-    """Fill arrays, laid out one after another with `LANES` innermost, with what one holds."""
+def _spread(first: Any, row: Any, arrays: Any) -> None:
+    """Fill the arrays of all trials, in rows of so many numbers, with what one holds."""
     index = cuda.grid(1)
     if index < arrays.size:
-        arrays[index] = first[index // LANES % first.size]
+        arrays[index] = first[(index // (LANES * row) * row + index % row) % first.size]
 
 
-def launch(space: Space, arguments: Any, trials: int) -> Any:
+def sent(arguments: Any) -> Any:
+    """Arguments of a kernel with the arrays that are the processor's sent to the card."""
+    return arguments if SIMULATED else changed((np.ndarray, np.generic), _sent, arguments)
+
+
+def launch(space: Space, arguments: Any, trials: int) -> None:
     """Run the kernel, and wait until it is done.
 
     Args:
         space: near memory of each trial.
-        arguments: of the kernel; arrays of the processor are sent to the card.
+        arguments: of the kernel, from `sent`.
         trials: threads.
-
-    Returns:
-        The arguments as they are then, their arrays on the card.
     """
     kernel = _kernel(space, None if SIMULATED else types_on_card(arguments))
-    sent = arguments if SIMULATED else changed((np.ndarray, np.generic), _sent, arguments)
     # A card ends the thread in which something is raised; its simulator raises it, whatever it is.
     unheard = contextlib.suppress(Exception) if SIMULATED else contextlib.nullcontext()
-    with warnings.catch_warnings(), unheard:
-        warnings.filterwarnings("ignore", "Grid size .* low occupancy")
-        kernel[-(-trials // THREADS), THREADS, 0, SHARED_BYTES](*sent)
+    with _unwarned(), unheard:
+        kernel[-(-trials // THREADS), THREADS, 0, SHARED_BYTES](*arguments)
     cuda.synchronize()
-    return sent
+
+
+def means(outcomes: Outcomes, training: int) -> TrialMeans:
+    """Means of each trial, found on the card.
+
+    Args:
+        outcomes: of the kernel, on the card.
+        training: how many of the episodes, from the first one on, are training.
+    """
+    trials = outcomes.assisted_return.shape[0]
+    found = TrialMeans(*(empty_array((trials,), np.float64) for _ in TrialMeans._fields))
+    with _unwarned():
+        _average[-(-trials // THREADS), THREADS](outcomes, training, found)
+    return returned(found)
+
+
+@cuda.jit
+def _average(outcomes: Any, training: Any, found: Any) -> None:
+    """Means of the trial whose place in the block is the number of the thread."""
+    trial = cuda.grid(1)
+    if trial < outcomes.assisted_return.shape[0]:
+        assisted = unassisted = 0.0
+        assisted_steps = unassisted_steps = overrides = 0
+        for episode in range(training):
+            assisted += outcomes.assisted_return[trial, episode]
+            unassisted += outcomes.unassisted_return[trial, episode]
+            assisted_steps += outcomes.assisted_length[trial, episode]
+            unassisted_steps += outcomes.unassisted_length[trial, episode]
+            overrides += outcomes.overrides[trial, episode]
+        found.assisted_return[trial] = assisted / training
+        found.unassisted_return[trial] = unassisted / training
+        found.assisted_length[trial] = assisted_steps / training
+        found.unassisted_length[trial] = unassisted_steps / training
+        found.overrides[trial] = overrides / training
 
 
 def returned(found: Any) -> Any:
@@ -125,8 +170,24 @@ def _sent(part: Any) -> Any:
 
 @functools.cache
 def _kernel(space: Space, kinds: tuple[Any, ...] | None) -> Any:
-    settings: dict[str, Any] = {} if SIMULATED else {"extensions": [_NoneAsNumber()]}
-    return cuda.jit(kinds, **settings)(trial_of_thread(space))
+    if SIMULATED:
+        return cuda.jit(kinds)(trial_of_thread(space))
+    with rounding_products():
+        return cuda.jit(kinds, extensions=[_NoneAsNumber()])(trial_of_thread(space))
+
+
+@contextlib.contextmanager
+def rounding_products() -> Iterator[None]:
+    """Within the block, compiled code rounds a product before it is added, as that of processors.
+
+    NVVM has an option for that, which numba-cuda does not pass on.
+    """
+    compile_ir = nvvm.compile_ir
+    nvvm.compile_ir = functools.partial(compile_ir, fma=False)
+    try:
+        yield
+    finally:
+        nvvm.compile_ir = compile_ir
 
 
 def types_on_card(arguments: tuple[Any, ...]) -> tuple[Any, ...]:

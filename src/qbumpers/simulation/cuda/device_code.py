@@ -208,10 +208,13 @@ class _Place:
         size, integer = _bytes(context, found.dtype), context.get_value_type(types.intp)
         group = builder.udiv(self.trial, integer(LANES))
         lane = builder.urem(self.trial, integer(LANES))
-        shape = cgutils.unpack_tuple(builder, arrays.shape, found.ndim + 2)[1:-1]
-        strides = _c_strides(builder, shape, size * LANES)
+        shape = cgutils.unpack_tuple(builder, arrays.shape, found.ndim + 2)[1:]
+        axis = max(1, found.ndim - 1)
+        shape[axis] = integer(LANES)
+        strides = _c_strides(builder, shape, size)
         whole = builder.mul(strides[0], shape[0])
-        offset = builder.add(builder.mul(group, whole), builder.mul(lane, integer(size)))
+        offset = builder.add(builder.mul(group, whole), builder.mul(lane, strides[axis]))
+        del shape[axis], strides[axis]
         data = _at(builder, arrays.data, offset)
         return _view(context, builder, found, data, shape, strides)
 

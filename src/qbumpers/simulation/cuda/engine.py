@@ -13,8 +13,16 @@ from qbumpers.simulation.cuda import card as cards
 from qbumpers.simulation.cuda.block import Begun, begin
 from qbumpers.simulation.cuda.devices import Card
 from qbumpers.simulation.cuda.kernel import Found
-from qbumpers.simulation.cuda.layout import LANES, Far, changed
-from qbumpers.simulation.outcomes import Outcomes, Simulation, Sinks, StateCounts, joined
+from qbumpers.simulation.cuda.layout import LANES, Far, changed, of_one
+from qbumpers.simulation.outcomes import (
+    Outcomes,
+    Simulation,
+    Sinks,
+    StateCounts,
+    TrialMeans,
+    joined,
+    trial_means,
+)
 
 _MOST_TRIALS = 1 << 18  # of a block: more than a large card runs at once, and over in a second
 _SHARE = 0.5  # of the free memory that a block may take
@@ -34,8 +42,7 @@ class _Ran(NamedTuple):
         outcomes: arrays [T, E].
         totals: of arrays [G, S], a row per part of the block.
         finished: uint8 [T].
-        record: `Step` of arrays [W, N, ..., `LANES`], for W times `LANES` trials; None if nothing
-            is kept.
+        record: `Step` of arrays as `Far` has them; None if nothing is kept.
     """
 
     outcomes: Outcomes
@@ -87,6 +94,22 @@ def run_block(condition: Condition, trials: range, seed: int, card: Card) -> Sim
     return found
 
 
+def run_means(condition: Condition, trials: range, seed: int, card: Card) -> TrialMeans:
+    """Means of trials, found on the card; `run_groups` says what the arguments are."""
+    begun, parts = begin(condition, card.precision, recorded=False), list[TrialMeans]()
+    for block in _blocks([trials], _most_trials(begun, card)):
+        with cards.chosen(card):
+            sinks, kept = _launched(condition, begun, block, seed)
+            means = cards.means(sinks.outcomes, condition.episodes)
+            finished = cards.returned(kept.finished)
+        for place, alone in _left(condition, block, seed, finished):
+            own = trial_means(alone.outcomes, condition.episodes)
+            for array, mean in zip(means, own, strict=True):
+                array[place] = mean[0]
+        parts.append(means)
+    return TrialMeans(*map(np.concatenate, zip(*parts, strict=True)))
+
+
 def records(condition: Condition, trials: range, seed: int, card: Card) -> Iterator[Step]:
     """Every step of training of trials.
 
@@ -107,9 +130,8 @@ def records(condition: Condition, trials: range, seed: int, card: Card) -> Itera
         ran = _run(condition, begun, block, seed, card)
         lengths = ran.outcomes.assisted_length.sum(axis=1).tolist()
         for place, trial in enumerate(_numbers(block)):
-            group, lane = divmod(place, LANES)
             if ran.finished[place]:
-                steps = [column[group, : lengths[place], ..., lane] for column in ran.record]
+                steps = [of_one(column, place)[: lengths[place]] for column in ran.record]
                 yield Step(*map(np.ascontiguousarray, steps))
             else:
                 yield tabular.record(condition, range(trial, trial + 1), seed, None)
@@ -185,24 +207,39 @@ def kernel_arguments(
 
 def _run(condition: Condition, begun: Begun, block: list[_Part], seed: int, card: Card) -> _Ran:
     """Run a block of trials, however each of them ends."""
-    groups = [part.trials for part in block]
     with cards.chosen(card):
-        arguments = kernel_arguments(
-            condition, begun, groups, seed, cards.own_arrays, cards.empty_array
-        )
-        *_, sinks, kept = cards.launch(begun.space, arguments, sum(map(len, groups)))
+        sinks, kept = _launched(condition, begun, block, seed)
         outcomes, found, record = cards.returned((sinks.outcomes, kept, sinks.record))
     steps = changed(Far, lambda far: far.arrays, record)
     return _Ran(outcomes, found.totals, found.finished, steps)
 
 
-def _finish(condition: Condition, block: list[_Part], seed: int, ran: _Ran) -> None:
-    """Do what came to no end on the card: the processor raises what a card cannot, or does it."""
+def _launched(
+    condition: Condition, begun: Begun, block: list[_Part], seed: int
+) -> tuple[Sinks, Found]:
+    """What a block of trials came to, on the card."""
+    groups = [part.trials for part in block]
+    arguments: Any = cards.sent(
+        kernel_arguments(condition, begun, groups, seed, cards.own_arrays, cards.empty_array)
+    )
+    cards.launch(begun.space, arguments, sum(map(len, groups)))
+    return arguments[-2:]
+
+
+def _left(
+    condition: Condition, block: list[_Part], seed: int, finished: np.ndarray
+) -> Iterator[tuple[int, Simulation]]:
+    """What came to no end on the card, by its place: the processor does it, or raises its error."""
     numbers = _numbers(block)
-    groups = np.repeat(np.arange(len(block)), [len(part.trials) for part in block])
-    for place in np.flatnonzero(ran.finished == 0).tolist():
+    for place in np.flatnonzero(finished == 0).tolist():
         trials = range(numbers[place], numbers[place] + 1)
-        alone = tabular.run_block(condition, trials, seed)
+        yield place, tabular.run_block(condition, trials, seed)
+
+
+def _finish(condition: Condition, block: list[_Part], seed: int, ran: _Ran) -> None:
+    """Fill in what came to no end on the card."""
+    groups = np.repeat(np.arange(len(block)), [len(part.trials) for part in block])
+    for place, alone in _left(condition, block, seed, ran.finished):
         for array, row in zip(ran.outcomes, alone.outcomes, strict=True):
             array[place] = row[0]
         group = groups[place]
