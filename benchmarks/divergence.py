@@ -8,15 +8,18 @@ step after another*, of whichever episode a thread is in, so that none waits for
 
 import functools
 import time
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from measuring import Row, Timed, alternate, compared, is_quick, show
+from measuring import Row, Timed, alternate, compared, is_quick, show, watched
 from numba import cuda as numba_cuda
+from numba.core import config
 
+from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
-from qbumpers.simulation import device_of
-from qbumpers.simulation.cuda.card import SIMULATED
+from qbumpers.simulation import device_of, simulate
+from qbumpers.simulation.cuda.layout import LANES
 from qbumpers.tasks import make_task
 from qbumpers.tasks.dynamics import TERMINATED
 
@@ -248,7 +251,8 @@ def run(task: str, way: str, learners: int, episodes: int) -> Ran:
 
 
 def _multiprocessors() -> int:
-    return 1 if SIMULATED else cuda.get_current_device().MULTIPROCESSOR_COUNT
+    simulated = config.ENABLE_CUDASIM  # type: ignore[attr-defined]
+    return 1 if simulated else cuda.get_current_device().MULTIPROCESSOR_COUNT
 
 
 def _timed(task: str, way: str, learners: int, episodes: int) -> Timed:
@@ -259,23 +263,34 @@ def _timed(task: str, way: str, learners: int, episodes: int) -> Timed:
     return timed
 
 
-def measure(quick: bool) -> list[Row]:
-    """Every row of this benchmark; none, with a sentence, if there is no card."""
+def at_work(task: str, assistant: str, trials: int) -> Row:
+    """Share of the threads that are at work, if groups of them end each episode together."""
+    outcomes = simulate(task, assistant, trials=trials, workers=usable_cores()).outcomes
+    steps = longest = 0
+    for lengths in (outcomes.assisted_length, outcomes.unassisted_length):
+        groups = lengths.reshape(-1, LANES, lengths.shape[1])
+        steps += int(groups.sum())
+        longest += LANES * int(groups.max(axis=1).sum())
+    return Row(f"{task}, {assistant}, threads at work", steps / longest, "of all")
+
+
+def measure(quick: bool) -> Iterator[Row]:
+    """Every row of this benchmark; of a card none, with a sentence, if there is none."""
+    for task in TASKS:
+        for assistant in ("none", "maximal"):
+            yield at_work(task, assistant, LANES if quick else 100 * LANES)
     try:
         device_of("gpu")
     except RequestError as error:
         print(f"Skipped: {error}")
-        return []
+        return
     learners, episodes, rounds = _QUICK if quick else _FULL
-    rows = []
     for task in TASKS[:1] if quick else TASKS:
         _check_agreement(task, learners, episodes)
         rates = alternate({way: _timed(task, way, learners, episodes) for way in WAYS}, rounds)
         plain = rates[WAYS[0]]
-        rows += [
-            compared(f"{task}, {way}", rate, UNIT, WAYS[0], plain) for way, rate in rates.items()
-        ]
-    return rows
+        for way, rate in rates.items():
+            yield compared(f"{task}, {way}", rate, UNIT, WAYS[0], plain)
 
 
 def _check_agreement(task: str, learners: int, episodes: int) -> None:
@@ -288,4 +303,4 @@ def _check_agreement(task: str, learners: int, episodes: int) -> None:
 
 
 if __name__ == "__main__":
-    show("Episodes of unequal length", measure(is_quick(__doc__)))
+    show("Episodes of unequal length", [*watched(measure(is_quick(__doc__)))])

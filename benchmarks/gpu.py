@@ -5,10 +5,11 @@ which also draws seeds and averages. Everything is compiled before anything is t
 """
 
 import time
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from measuring import Row, Target, Timed, alternate, compared, is_quick, show
+from measuring import Row, Target, Timed, alternate, compared, is_quick, show, watched
 
 from qbumpers.assistants import make_assistant
 from qbumpers.cores import usable_cores
@@ -174,20 +175,21 @@ def _check_agreement(found: Any, condition: Condition, trials: int, card: Card) 
             )
 
 
-def measure(quick: bool) -> list[Row]:
+def measure(quick: bool) -> Iterator[Row]:
     """Every row of this benchmark; none, with a sentence, if there is no card."""
     try:
         card = device_of("gpu")
     except RequestError as error:
         print(f"Skipped: {error}")
-        return []
+        return
     number = card.number if card else 0
     tasks = list(TASKS)[:1] if quick else list(TASKS)
     prepared = against_plain_kernel(quick, number)
     for task in tasks:
         prepared += against_cores(task, quick, number)
     rounds = (_QUICK if quick else _FULL)[-1]
-    return [row for each in prepared for row in _rows(each, rounds)]
+    for each in prepared:
+        yield from _rows(each, rounds)
 
 
 def _rows(prepared: Prepared, rounds: int) -> list[Row]:
@@ -204,4 +206,4 @@ def _rows(prepared: Prepared, rounds: int) -> list[Row]:
 
 
 if __name__ == "__main__":
-    show("On a graphics card", measure(is_quick(__doc__)))
+    show("On a graphics card", [*watched(measure(is_quick(__doc__)))])

@@ -2,8 +2,9 @@
 
 import argparse
 import statistics
+import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from rich.console import Console
@@ -124,6 +125,14 @@ def _target(row: Row) -> str:
     limit, at_least = row.target
     met = row.measured >= limit if at_least else row.measured < limit
     return f"{'>=' if at_least else '<'} {number(limit)} {row.unit}: {'met' if met else 'missed'}"
+
+
+def watched(rows: Iterable[Row]) -> Iterator[Row]:
+    """Rows, each of which is said as soon as it is measured: the table comes at the end."""
+    for row in rows:
+        ratio = f", {_ratio(row)} of {row.baseline}" if row.ratios else ""
+        print(f"{row.name}: {number(row.measured)} {row.unit}{ratio}", file=sys.stderr, flush=True)
+        yield row
 
 
 def is_quick(description: str | None) -> bool:

@@ -8,10 +8,12 @@ thousand learners per point. Numbers are kept in docs/data/gpu, the map in docs/
 """
 
 import argparse
+import functools
 import importlib
 import json
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,7 +57,7 @@ class Size(NamedTuple):
 QUICK = Size(2, 4, 2, (0.2, 0.8), (0.0,), (0.9, 0.999))
 
 
-def agreement(size: Size, card: Card) -> dict[str, Any]:
+def agreement(size: Size, card: Card, keep: Callable[[Any], None]) -> None:
     """How many trials part, and the means of both."""
     from qbumpers.simulation.cuda.agreement import agreement as compared
 
@@ -77,19 +79,21 @@ def agreement(size: Size, card: Card) -> dict[str, Any]:
             error = means.std() / len(means) ** 0.5
             found[f"{device} {precision} {name}"] = {"mean": means.mean(), "error": error}
             print(f"{device}, {precision}, {name}: {means.mean():.3f} +- {error:.3f}")
-    return found
+            keep(found)
 
 
-def benchmark(name: str, title: str, quick: bool) -> dict[str, Any]:
-    """The rows of a benchmark."""
+def benchmark(name: str, quick: bool, keep: Callable[[Any], None]) -> None:
+    """The rows of a benchmark, each kept as soon as it is measured."""
     sys.path.insert(0, str(FOLDER.parent / "benchmarks"))
     measured, measuring = importlib.import_module(name), importlib.import_module("measuring")
-    rows = measured.measure(quick)
-    measuring.show(title, rows)
-    return {"rows": [{**row._asdict(), "ratios": list(row.ratios)} for row in rows]}
+    rows = []
+    for row in measuring.watched(measured.measure(quick)):
+        rows.append(row)
+        keep({"rows": [{**each._asdict(), "ratios": list(each.ratios)} for each in rows]})
+    measuring.show(str(measured.__doc__).splitlines()[0], rows)
 
 
-def map_of_bumpers(size: Size) -> dict[str, Any]:
+def map_of_bumpers(size: Size, keep: Callable[[Any], None]) -> None:
     """Normalised hypervolume of bumpers for each `v_min` and `p_max`, over all alphas."""
     task = make_task("cliff-walking")
     best = float(solve(task)(int(np.flatnonzero(task.start)[0])).max())
@@ -110,8 +114,8 @@ def map_of_bumpers(size: Size) -> dict[str, Any]:
         for floor in size.floors
     ]
     print(f"{len(points) * len(size.alphas)} points of {size.learners} learners: {seconds:.1f} s")
-    _draw(size, np.array(shares))
-    return {"shares": shares, "seconds": seconds, "points": len(points) * len(size.alphas)}
+    keep({"shares": shares, "seconds": seconds, "points": len(points) * len(size.alphas)})
+    draw(shares, size, _folder(size) / "images" / "gpu-map.png")
 
 
 def _point(size: Size, name: str, options: dict[str, float]) -> tuple[float, float]:
@@ -122,20 +126,31 @@ def _point(size: Size, name: str, options: dict[str, float]) -> tuple[float, flo
     return float(means.assisted_return.mean()), float(means.unassisted_return.mean())
 
 
-def _draw(size: Size, shares: np.ndarray) -> None:
+def draw(shares: list[list[float]], size: Size, file: Path) -> None:
+    """Draw the map.
+
+    Args:
+        shares: hypervolume by `v_min` and `p_max`, as a share of the box.
+        size: what was simulated.
+        file: PNG, to be written.
+    """
     import matplotlib as mpl
 
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-    image = axes.imshow(shares, origin="lower", aspect="auto", cmap="viridis")
+    figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+    image = axes.imshow(shares, origin="lower", aspect="auto", cmap="viridis", vmin=0, vmax=1)
+    for row, numbers in enumerate(shares):
+        for column, number in enumerate(numbers):
+            colour = "black" if number > 0.6 else "white"
+            axes.text(column, row, f"{number:.2f}", ha="center", va="center", color=colour)
     axes.set_xticks(range(len(size.sure)), [f"{sure:g}" for sure in size.sure])
     axes.set_yticks(range(len(size.floors)), [f"{floor:g}" for floor in size.floors])
     axes.set_xlabel("p_max")
     axes.set_ylabel("v_min")
-    figure.colorbar(image, label="share of the box that the alphas cover")
-    figure.savefig(_folder(size) / "images" / "gpu-map.png", dpi=150)
+    figure.colorbar(image, label="share of the box that all alphas cover")
+    figure.savefig(file, dpi=150)
     plt.close(figure)
 
 
@@ -159,17 +174,20 @@ def main() -> None:
     card = device_of("gpu")
     assert card is not None
     size = QUICK if given.quick else Size()
-    work = {
-        "agreement": lambda: agreement(size, card),
-        "benchmark": lambda: benchmark("gpu", "On a graphics card", given.quick),
-        "divergence": lambda: benchmark("divergence", "Episodes of unequal length", given.quick),
-        "map": lambda: map_of_bumpers(size),
-    }
     folder = _folder(size) / "data" / "gpu"
     folder.mkdir(parents=True, exist_ok=True)
-    for part in given.parts or parts:
-        found = work[part]()
+
+    def keep(part: str, found: Any) -> None:
         (folder / f"{part}.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+
+    work: dict[str, Callable[[Callable[[Any], None]], None]] = {
+        "agreement": lambda keep: agreement(size, card, keep),
+        "benchmark": lambda keep: benchmark("gpu", given.quick, keep),
+        "divergence": lambda keep: benchmark("divergence", given.quick, keep),
+        "map": lambda keep: map_of_bumpers(size, keep),
+    }
+    for part in given.parts or parts:
+        work[part](functools.partial(keep, part))
 
 
 if __name__ == "__main__":

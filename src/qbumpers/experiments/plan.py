@@ -1,6 +1,7 @@
 """An experiment made ready: checked as a whole, with nothing run yet."""
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
@@ -28,7 +29,8 @@ from qbumpers.values import (
 )
 
 _CALIBRATION, _DEEP_CALIBRATION = 0.01, 0.3  # seconds that a timing should last to mean something
-_MOST_ON_CARD = 1 << 16  # trials of a calibration on a card
+_MOST_ON_CARD, _MORE_ON_CARD = 1 << 16, 16  # trials of a calibration on a card, and steps to them
+_CALIBRATION_ON_CARD = 0.1  # seconds
 _SHORT, _USUAL = 50, 250  # steps of an episode: of a calibration at most; assumed of a trial
 
 
@@ -216,16 +218,17 @@ def _measured(condition: Condition, plan: Plan) -> float:
 
 
 def _seconds_on_card(condition: Condition, seed: int, card: Card) -> float:
-    """From the largest number of trials that take no longer than a single one."""
+    """From so many trials that time grows with their number: fewer take as long as one."""
     run_condition(condition, trials=1, seed=seed, card=card)
-    trials, before = 1, 0.0
+    trials, before = 1, math.inf
     while True:
         begun = time.perf_counter()
         run_condition(condition, trials=trials, seed=seed, card=card)
         seconds = time.perf_counter() - begun
-        if trials == _MOST_ON_CARD or (before and seconds > 2 * before):
+        grows = seconds > _CALIBRATION_ON_CARD and seconds > before * _MORE_ON_CARD / 2
+        if trials == _MOST_ON_CARD or grows:
             return seconds / trials
-        trials, before = min(16 * trials, _MOST_ON_CARD), seconds
+        trials, before = min(_MORE_ON_CARD * trials, _MOST_ON_CARD), seconds
 
 
 def _seconds_a_trial(condition: Condition, seed: int) -> float:

@@ -12,7 +12,7 @@ from numba.cuda.cudadrv import nvvm
 
 from qbumpers.simulation import Condition
 from qbumpers.simulation.cuda.block import Begun, begin
-from qbumpers.simulation.cuda.card import rounding_products, types_on_card
+from qbumpers.simulation.cuda.card import types_on_card
 from qbumpers.simulation.cuda.devices import Precision
 from qbumpers.simulation.cuda.engine import kernel_arguments
 from qbumpers.simulation.cuda.kernel import trial_of_thread
@@ -49,7 +49,7 @@ def compile_kernel(
     begun = begin(condition, precision, recorded)
     arguments = kernel_arguments(condition, begun, [trials], seed, own_arrays, empty_array)
     kinds = types_on_card(arguments)
-    with _without_card() as modules, rounding_products():
+    with _without_card() as modules:
         ptx, _ = cuda.compile_ptx(trial_of_thread(begun.space), kinds, cc=COMPUTE_CAPABILITY)
     return Kernel(ptx, modules[-1], arguments, kinds, begun)
 

@@ -108,12 +108,6 @@ def test_a_trial_whose_learner_chooses_no_action_comes_to_no_end():
     assert not found.finished.any()
 
 
-def test_products_are_rounded_before_they_are_added_as_on_the_processor():
-    nobody = make_assistant("none")
-    condition = cases.with_learner("two-rate")._replace(assistant=nobody)
-    assert "fma." not in compile_kernel(condition).ptx
-
-
 @pytest.mark.parametrize("kind", ["float32", "float64"])
 def test_the_kernel_that_benchmarks_compare_with_compiles(kind, monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")

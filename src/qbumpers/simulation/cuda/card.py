@@ -15,7 +15,6 @@ import numpy as np
 from numba import cuda as numba_cuda
 from numba import typeof
 from numba.core import config, types
-from numba.cuda.cudadrv import nvvm as numba_nvvm
 
 from qbumpers.simulation.cuda.devices import Card
 from qbumpers.simulation.cuda.kernel import trial_of_thread
@@ -23,7 +22,6 @@ from qbumpers.simulation.cuda.layout import LANES, WORD, Far, Space, changed, of
 from qbumpers.simulation.outcomes import Outcomes, TrialMeans
 
 cuda: Any = numba_cuda
-nvvm: Any = numba_nvvm
 
 SIMULATED: bool = bool(config.ENABLE_CUDASIM)  # type: ignore[attr-defined]
 
@@ -170,24 +168,8 @@ def _sent(part: Any) -> Any:
 
 @functools.cache
 def _kernel(space: Space, kinds: tuple[Any, ...] | None) -> Any:
-    if SIMULATED:
-        return cuda.jit(kinds)(trial_of_thread(space))
-    with rounding_products():
-        return cuda.jit(kinds, extensions=[_NoneAsNumber()])(trial_of_thread(space))
-
-
-@contextlib.contextmanager
-def rounding_products() -> Iterator[None]:
-    """Within the block, compiled code rounds a product before it is added, as that of processors.
-
-    NVVM has an option for that, which numba-cuda does not pass on.
-    """
-    compile_ir = nvvm.compile_ir
-    nvvm.compile_ir = functools.partial(compile_ir, fma=False)
-    try:
-        yield
-    finally:
-        nvvm.compile_ir = compile_ir
+    settings: dict[str, Any] = {} if SIMULATED else {"extensions": [_NoneAsNumber()]}
+    return cuda.jit(kinds, **settings)(trial_of_thread(space))
 
 
 def types_on_card(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
