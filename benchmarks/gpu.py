@@ -4,6 +4,7 @@ The rate of a card is that of its kernel alone, and beside it that of `simulate_
 which also draws seeds and averages. Everything is compiled before anything is timed.
 """
 
+import functools
 import time
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -111,7 +112,7 @@ class Prepared(NamedTuple):
         name: of the condition.
         baseline: of `timed`, in words.
         timed: by name; the baseline too.
-        target: of a row, as a share of the baseline's rate; None if there is none.
+        target: of the package's kernel, as a share of the baseline's rate; None if there is none.
     """
 
     name: str
@@ -146,15 +147,22 @@ def against_plain_kernel(quick: bool, number: int) -> list[Prepared]:
     bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
     condition = make_condition("cliff-walking", bumpers, episodes=episodes)
     for precision, share in SHARES.items():
-        by_hand = plain_gpu.run(trials, episodes, 0.7, precision)
-        _check_agreement(by_hand, condition, trials, Card(number, precision))  # type: ignore[arg-type]
+        card = Card(number, precision)  # type: ignore[arg-type]
 
-        def plain(_: int, kind: str = precision) -> float:
-            one = plain_gpu.run(trials, episodes, 0.7, kind)
+        def plain(_: int, kind: str = precision, bits: str = "32 bits") -> float:
+            one = plain_gpu.run(trials, episodes, 0.7, kind, bits)
             return one.steps / one.seconds / 1e6
 
-        ours = kernel(condition, trials, Card(number, precision))  # type: ignore[arg-type]
-        timed = {"plain kernel": plain, f"kernel, {precision}": ours}
+        for bits in plain_gpu.STREAMS:
+            by_hand = plain_gpu.run(trials, episodes, 0.7, precision, bits)
+            _check_agreement(by_hand, condition, trials, card)
+        timed = {
+            "plain kernel": plain,
+            f"plain kernel with 64-bit streams, {precision}": functools.partial(
+                plain, bits="64 bits"
+            ),
+            f"kernel, {precision}": kernel(condition, trials, card),
+        }
         found.append(Prepared("cliff-walking, bumpers", "plain kernel", timed, share))
     return found
 
@@ -200,9 +208,12 @@ def _rows(prepared: Prepared, rounds: int) -> list[Row]:
     if share is not None:
         target = Target(share * float(np.median(compared_with)), at_least=True)
     return [
-        compared(f"{name}, {what}", rate, UNIT, baseline, compared_with, target)
+        compared(
+            f"{name}, {what}", rate, UNIT, baseline, compared_with,
+            target if what.startswith("kernel") else None,
+        )
         for what, rate in rates.items()
-    ]
+    ]  # fmt: skip
 
 
 if __name__ == "__main__":

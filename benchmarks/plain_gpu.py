@@ -2,6 +2,7 @@
 
 A kernel of one task, one rule and one learner, with 32-bit random numbers and nothing kept but the
 mean returns of each learner. It is written apart from the package, which is measured against it.
+With the package's own streams of 64 bits in their place, it says what these cost.
 """
 
 import functools
@@ -11,6 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import cuda as numba_cuda
+
+from qbumpers.random_streams import draw
 
 cuda: Any = numba_cuda
 
@@ -46,15 +49,6 @@ def tables(kind: str) -> tuple[np.ndarray, ...]:
 
 
 @cuda.jit(device=True, inline="always")
-def uniform(word: Any) -> Any:
-    """Xorshift's next word of 32 bits (Marsaglia 2003)."""
-    word ^= (word << 13) & 0xFFFFFFFF
-    word ^= word >> 17
-    word ^= (word << 5) & 0xFFFFFFFF
-    return word & 0xFFFFFFFF
-
-
-@cuda.jit(device=True, inline="always")
 def one_of(table: Any, first: Any, target: Any, chance: Any) -> Any:
     """One of the four actions of a value, each alike."""
     equal = 0
@@ -77,12 +71,62 @@ def best_of(table: Any, first: Any) -> Any:
     return max(one, max(table[first + 2], table[first + 3]))
 
 
-@functools.cache
-def make_kernel(kind: str) -> Any:
-    """The kernel for numbers of a kind, "float32" or "float64"."""
-    real = np.float32 if kind == "float32" else np.float64
+class Stream(NamedTuple):
+    """Random numbers of a learner: words and type of its state, how it begins, and the next one."""
+
+    words: int
+    kind: Any
+    begin: Any
+    uniform: Any
+
+
+def short_stream(real: Any) -> Stream:
+    """Words of 32 bits by Xorshift (Marsaglia 2003)."""
     share = real(2.0**-24)
+
+    @cuda.jit(device=True, inline="always")
+    def begin(learner: Any, state: Any) -> None:
+        state[0] = learner * 2654435761 % 4294967295 + 1
+
+    @cuda.jit(device=True, inline="always")
+    def uniform(state: Any) -> Any:
+        word = state[0]
+        word ^= (word << 13) & 0xFFFFFFFF
+        word ^= word >> 17
+        word ^= (word << 5) & 0xFFFFFFFF
+        state[0] = word & 0xFFFFFFFF
+        return real(state[0] >> 8) * share
+
+    return Stream(1, np.int64, begin, uniform)
+
+
+def long_stream(real: Any) -> Stream:
+    """Words of 64 bits by SFC64, as the package draws them."""
+
+    @cuda.jit(device=True, inline="always")
+    def begin(learner: Any, state: Any) -> None:
+        for word in range(3):
+            state[word] = np.uint64(learner + 1)
+        state[3] = np.uint64(1)
+        for _ in range(12):
+            draw(state)
+
+    @cuda.jit(device=True, inline="always")
+    def uniform(state: Any) -> Any:
+        return real(draw(state))
+
+    return Stream(4, np.uint64, begin, uniform)
+
+
+STREAMS = {"32 bits": short_stream, "64 bits": long_stream}
+
+
+@functools.cache
+def make_kernel(kind: str, bits: str = "32 bits") -> Any:
+    """The kernel for numbers of a kind, "float32" or "float64", and one of `STREAMS`."""
+    real = np.float32 if kind == "float32" else np.float64
     steepness = real(2 * math.log(0.001 / 0.999))
+    words, state_kind, begin, uniform = STREAMS[bits](real)
 
     @cuda.jit
     def kernel(next_state: Any, reward: Any, values: Any, alpha: Any, episodes: Any, found: Any,
@@ -93,7 +137,8 @@ def make_kernel(kind: str) -> Any:
         table = cuda.local.array(192, real)
         for place in range(192):
             table[place] = real(0)
-        word = learner * 2654435761 % 4294967295 + 1
+        stream = cuda.local.array(words, state_kind)
+        begin(learner, stream)
         start = best_of(values, 4 * START)
         allowed = alpha * start
         assisted, unassisted, taken = 0.0, 0.0, 0
@@ -103,10 +148,8 @@ def make_kernel(kind: str) -> Any:
             state, earned = START, real(0)
             for _ in range(LIMIT):
                 first = 4 * state
-                word = uniform(word)
-                explores = real(word >> 8) * share < rate
-                word = uniform(word)
-                chance = real(word >> 8) * share
+                explores = uniform(stream) < rate
+                chance = uniform(stream)
                 proposed = int(chance * real(4))
                 if not explores:
                     proposed = one_of(table, first, best_of(table, first), chance)
@@ -117,10 +160,8 @@ def make_kernel(kind: str) -> Any:
                 if second < real(-1e29):
                     second = best
                 executed = proposed
-                word = uniform(word)
-                coin = real(word >> 8) * share
-                word = uniform(word)
-                tie = real(word >> 8) * share
+                coin = uniform(stream)
+                tie = uniform(stream)
                 if values[first + proposed] < second:
                     if start - (earned + second) >= allowed:
                         executed = one_of(values, first, best, tie)
@@ -142,8 +183,7 @@ def make_kernel(kind: str) -> Any:
             state = START
             for _ in range(LIMIT):
                 first = 4 * state
-                word = uniform(word)
-                chosen = one_of(table, first, best_of(table, first), real(word >> 8) * share)
+                chosen = one_of(table, first, best_of(table, first), uniform(stream))
                 unassisted += reward[first + chosen]
                 taken += 1
                 state = next_state[first + chosen]
@@ -156,11 +196,11 @@ def make_kernel(kind: str) -> Any:
     return kernel
 
 
-def run(learners: int, episodes: int, alpha: float, kind: str) -> Plain:
+def run(learners: int, episodes: int, alpha: float, kind: str, bits: str = "32 bits") -> Plain:
     """Simulate learners, and say how long the kernel took alone."""
     sent = [cuda.to_device(array) for array in tables(kind)]
     found, steps = cuda.device_array((learners, 2)), cuda.device_array(learners, np.int64)
-    kernel, blocks = make_kernel(kind), -(-learners // THREADS)
+    kernel, blocks = make_kernel(kind, bits), -(-learners // THREADS)
     share = np.dtype(kind).type(alpha)
     kernel[blocks, THREADS](*sent, share, 1, found, steps)
     cuda.synchronize()

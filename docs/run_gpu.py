@@ -1,10 +1,11 @@
 """Measure a graphics card: `python docs/run_gpu.py [PART ...]`, some minutes on a large card.
 
-Four parts: `agreement`, in how many of 10,000 trials a step is another one than on the processor,
-and whether means agree; `benchmark`, benchmarks/gpu.py; `divergence`, benchmarks/divergence.py;
-`map`, the hypervolume of bumpers over `v_min` and `p_max`, with all alphas in it, at a hundred
-thousand learners per point. Numbers are kept in docs/data/gpu, the map in docs/images/gpu-map.png.
-`--quick` shows that it runs, with a simulated card too.
+Five parts: `seconds`, how long how many learners take on the cores of this machine and on the card,
+on the cores alone if there is none; `agreement`, in how many of 10,000 trials a step is another one
+than on the processor, and whether means agree; `benchmark`, benchmarks/gpu.py; `divergence`,
+benchmarks/divergence.py; `map`, the hypervolume of bumpers over `v_min` and `p_max`, with all
+alphas in it, at a hundred thousand learners per point. Numbers are kept in docs/data/gpu, the map
+in docs/images/gpu-map.png. `--quick` shows that it runs, with a simulated card too.
 """
 
 import argparse
@@ -21,6 +22,8 @@ import numpy as np
 
 from qbumpers import make_assistant, make_task, simulate, solve
 from qbumpers.analysis.hypervolume import hypervolume
+from qbumpers.cores import usable_cores
+from qbumpers.errors import RequestError
 from qbumpers.learners import make_learner
 from qbumpers.simulation import Card, device_of, make_condition, simulate_means
 
@@ -44,6 +47,7 @@ class Size(NamedTuple):
         alphas: of the map.
         floors: values of `v_min`.
         sure: values of `p_max`.
+        numbers: learners whose seconds are measured.
     """
 
     agreement: int = 10_000
@@ -52,9 +56,29 @@ class Size(NamedTuple):
     alphas: tuple[float, ...] = ALPHAS
     floors: tuple[float, ...] = FLOORS
     sure: tuple[float, ...] = SURE
+    numbers: tuple[int, ...] = (100, 1_000, 10_000, 100_000, 1_000_000)
 
 
-QUICK = Size(2, 4, 2, (0.2, 0.8), (0.0,), (0.9, 0.999))
+QUICK = Size(2, 4, 2, (0.2, 0.8), (0.0,), (0.9, 0.999), (2, 4))
+MOST_ON_CORES = 100_000
+
+
+def seconds(size: Size, card: Card | None, keep: Callable[[Any], None]) -> None:
+    """How long means of learners with bumpers take, once everything is compiled."""
+    bumpers = make_assistant("stochastic-q-bumpers", alpha=0.7, second=True)
+    devices = ["processor"] if card is None else ["processor", "gpu"]
+    found: dict[str, dict[int, float]] = {device: {} for device in devices}
+    for device in devices:
+        for trials in (1, *size.numbers):
+            if device == "gpu" or trials <= MOST_ON_CORES:
+                begin = time.perf_counter()
+                simulate_means(
+                    "cliff-walking", bumpers, trials=trials, seed=SEED, device=device,
+                    workers=usable_cores(), episodes=size.episodes,
+                )  # fmt: skip
+                found[device][trials] = time.perf_counter() - begin
+                print(f"{device}, {trials} learners: {found[device][trials]:.3f} s")
+                keep(found)
 
 
 def agreement(size: Size, card: Card, keep: Callable[[Any], None]) -> None:
@@ -164,15 +188,19 @@ def _folder(size: Size) -> Path:
 def main() -> None:
     """Measure, print, and keep the numbers."""
     arguments = argparse.ArgumentParser(description=__doc__)
-    parts = ("agreement", "benchmark", "divergence", "map")
+    parts = ("seconds", "agreement", "benchmark", "divergence", "map")
     arguments.add_argument("parts", nargs="*", metavar="PART", help=", ".join(parts))
     arguments.add_argument("--quick", action="store_true", help="small, to see that it runs")
     given = arguments.parse_args()
     for part in given.parts:
         if part not in parts:
             arguments.error(f"PART = {part!r}; one of {', '.join(parts)} is needed")
-    card = device_of("gpu")
-    assert card is not None
+    card: Any = None
+    try:
+        card = device_of("gpu")
+    except RequestError as error:
+        if given.parts != ["seconds"]:
+            arguments.error(str(error))
     size = QUICK if given.quick else Size()
     folder = _folder(size) / "data" / "gpu"
     folder.mkdir(parents=True, exist_ok=True)
@@ -181,6 +209,7 @@ def main() -> None:
         (folder / f"{part}.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
 
     work: dict[str, Callable[[Callable[[Any], None]], None]] = {
+        "seconds": lambda keep: seconds(size, card, keep),
         "agreement": lambda keep: agreement(size, card, keep),
         "benchmark": lambda keep: benchmark("gpu", given.quick, keep),
         "divergence": lambda keep: benchmark("divergence", given.quick, keep),

@@ -54,12 +54,14 @@ def compile_kernel(
     return Kernel(ptx, modules[-1], arguments, kinds, begun)
 
 
-def compile_plain(plain: Any, kind: str) -> str:
+def compile_plain(plain: Any, kind: str, bits: str) -> str:
     """The kernel of benchmarks/plain_gpu.py."""
     tables, found, steps = plain.tables(kind), np.zeros((2, 2)), np.zeros(2, np.int64)
     kinds = tuple(map(typeof, (*tables, np.dtype(kind).type(0.7), 2, found, steps)))
     with _without_card():
-        ptx, _ = cuda.compile_ptx(plain.make_kernel(kind).py_func, kinds, cc=COMPUTE_CAPABILITY)
+        ptx, _ = cuda.compile_ptx(
+            plain.make_kernel(kind, bits).py_func, kinds, cc=COMPUTE_CAPABILITY
+        )
     return ptx
 
 

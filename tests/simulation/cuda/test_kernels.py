@@ -109,10 +109,11 @@ def test_a_trial_whose_learner_chooses_no_action_comes_to_no_end():
 
 
 @pytest.mark.parametrize("kind", ["float32", "float64"])
-def test_the_kernel_that_benchmarks_compare_with_compiles(kind, monkeypatch):
+@pytest.mark.parametrize("bits", ["32 bits", "64 bits"])
+def test_the_kernel_that_benchmarks_compare_with_compiles(kind, bits, monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")
     plain = importlib.import_module("plain_gpu")
-    assert ".visible .entry" in compile_plain(plain, kind)
+    assert ".visible .entry" in compile_plain(plain, kind, bits)
 
 
 @pytest.mark.parametrize(
