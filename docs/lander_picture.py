@@ -1,4 +1,4 @@
-"""What was tried at Lunar Lander, and what comes before a crash, as a picture."""
+"""What was tried at Lunar Lander, in the plane of both returns."""
 
 from typing import Any
 
@@ -9,52 +9,40 @@ from writing import DOCS
 
 from qbumpers.analysis.figures.style import figure
 
-_BUMPERS, _TRIED, _SAVED = "#0072b2", "#d55e00", "#009e73"
+_MARKERS = "ov^<>spDP"
+_BUMPERS = "#0072b2"
+_INKS = (_BUMPERS, "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999",
+         "#8b4513")  # fmt: skip
+_CLOSE = ((180, 240), (125, 240))
 
 
-def lander_picture(found: dict[str, Any]) -> Figure:
-    """Draw rules in the plane of both returns, and the steps before a crash.
+def lander_picture(rules: dict[str, Any]) -> Figure:
+    """Draw rules among the settings of bumpers, all of them and those that learn well.
 
     Args:
-        found: what `run_lander_rules.py` kept.
+        rules: by name, what `run_lander_rules.py` kept of each.
     """
-    with figure(11, 4.4) as drawing:
-        plane, crash = drawing.subplots(1, 2, width_ratios=(1.5, 1))
-        _draw_rules(plane, found["rules"])
-        _draw_crashes(crash, found["before"])
+    with figure(11, 4.2) as drawing:
+        plane, close = drawing.subplots(1, 2)
+        for axes in (plane, close):
+            _draw(axes, rules)
+        plane.set(title="All", xlim=(120, 240))
+        close.set(title="Those that learn well", xlim=_CLOSE[0], ylim=_CLOSE[1])
+        close.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize=8)
     return drawing
 
 
-def _draw_rules(axes: Axes, rules: dict[str, Any]) -> None:
+def _draw(axes: Axes, rules: dict[str, Any]) -> None:
     kept = pl.read_csv(DOCS / "data" / "lunar-lander" / "trials.csv")
     kept = kept.filter(pl.col("assistant") == "stochastic-q-bumpers").group_by("alpha")
     settings = kept.agg(pl.col("assisted", "unassisted").mean()).sort("alpha")
     axes.plot(
-        settings["assisted"], settings["unassisted"], "o-", color=_BUMPERS, alpha=0.4,
-        label="bumpers, α from 0 to 1",
+        settings["assisted"], settings["unassisted"], ".-", color=_BUMPERS, alpha=0.4,
+        label="bumpers, α from 0 to 1,\nof the page on Lunar Lander",
     )  # fmt: skip
-    for name, each in rules.items():
-        ink = _BUMPERS if name.startswith("bumpers") else _TRIED
-        label = "rules that were tried" if name == list(rules)[1] else None
-        axes.plot(each["assisted"], each["unassisted"], "D", color=ink, label=label)
-        axes.annotate(
-            name, (each["assisted"], each["unassisted"]), xytext=(-6, -3), ha="right",
-            textcoords="offset points", fontsize=7,
+    for (name, each), marker, ink in zip(rules.items(), _MARKERS, _INKS, strict=True):
+        axes.errorbar(
+            each["assisted"], each["unassisted"], each["unassisted_error"], each["assisted_error"],
+            marker=marker, color=ink, label=name, linestyle="none", elinewidth=0.8,
         )  # fmt: skip
-    axes.set(xlabel="assisted return", ylabel="unassisted return", title="Lunar Lander")
-    axes.set(xlim=(95, 240))
-    axes.legend(loc="lower left", fontsize=8)
-
-
-def _draw_crashes(axes: Axes, before: dict[str, Any]) -> None:
-    steps = [int(each) for each in before]
-    values, corrected, saved, _ = zip(*before.values(), strict=True)
-    axes.plot(steps, values, "o-", color=_BUMPERS, label="the expert's value")
-    axes.plot(steps, corrected, "s-", color=_TRIED, label="corrected")
-    axes.plot([], [], "^--", color=_SAVED, label="share saved by the expert")
-    axes.set(xlabel="steps before a crash", ylabel="value of the state")
-    axes.invert_xaxis()
-    share = axes.twinx()
-    share.plot(steps, saved, "^--", color=_SAVED)
-    share.set(ylim=(-0.05, 1.05), ylabel="share saved")
-    axes.legend(fontsize=8, loc="lower left")
+    axes.set(xlabel="assisted return", ylabel="unassisted return")

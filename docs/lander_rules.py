@@ -87,43 +87,6 @@ def scheduled_bumpers(situation: Situation, noise: Noise, options: Scheduled) ->
     return mended(situation, noise, bumpers(situation, alpha))
 
 
-class Turns(NamedTuple):
-    """Whole episodes by turns.
-
-    Attributes:
-        share: of the episodes in which every worse proposal is overridden.
-    """
-
-    share: float
-
-
-@register_assistant("turns", Turns)
-@compiled
-def turns(situation: Situation, noise: Noise, options: Turns) -> Decision:
-    """Bumpers at alpha = 1 in the other episodes, so that half of what is learned is true."""
-    episode, share = situation.episode, options.share
-    ours = math.floor((episode + 1) * share) > math.floor(episode * share)
-    return mended(situation, noise, 1.0 if ours else bumpers(situation, 1.0))
-
-
-class Contrast(NamedTuple):
-    """What the learner must be able to see.
-
-    Attributes:
-        left: how much worse than the best action a mistake must look, in reward units.
-    """
-
-    left: float
-
-
-@register_assistant("contrast", Contrast)
-@compiled
-def contrast(situation: Situation, noise: Noise, options: Contrast) -> Decision:
-    """Override as often as leaves the mistake worse by `left` in the learner's mean credit."""
-    lost = loss(situation.values, situation.proposed)
-    return mended(situation, noise, max(0.0, 1 - options.left / lost) if lost > 0 else 0.0)
-
-
 class Recent(NamedTuple):
     """An account that forgets.
 

@@ -81,7 +81,7 @@ def write(folder: Path) -> None:
         path.stem.replace("-", "_"): json.loads(path.read_text(encoding="utf-8"))
         for path in sorted(DATA.glob("*.json"))
     }
-    pictures.keep(lander_picture(data["lunar_lander"]), images, "learner-aware-lander")
+    pictures.keep(lander_picture(data["lunar_lander"]["rules"]), images, "learner-aware-lander")
     page = template("learner-aware.md.j2", signed).render(data)
     (folder / "learner-aware.md").write_text(page, encoding="utf-8")
 

@@ -49,22 +49,19 @@ class Tried(NamedTuple):
     """
 
     rule: tuple[str, dict[str, Any]]
-    learners: int = 4
+    learners: int = 3
     corrected: bool = False
 
 
 TRIED = {
-    BUMPERS: Tried(("stochastic-q-bumpers", {"alpha": 1.0}), learners=10),
+    BUMPERS: Tried(("stochastic-q-bumpers", {"alpha": 1.0}), 10),
     "more help at first": Tried(("scheduled-bumpers", {"begin": 0.5, "over": 150})),
     "less help always": Tried(("stochastic-q-bumpers", {"alpha": 1.0, "v_min": -22.0})),
-    "no help after episode 200": Tried(("scheduled-bumpers", {"begin": 1.0, "until": FIRST})),
-    "the second-best action": Tried(("stochastic-q-bumpers", {"alpha": 1.0, "second": True})),
+    "no help after episode 200": Tried(("scheduled-bumpers", {"begin": 1.0, "until": FIRST}), 10),
     "α governed": Tried(("governed", {"share": 0.02})),
     "crashes foreseen": Tried(("watchful", {"alpha": 1.0}), corrected=True),
     "losses of late": Tried(("recent", {"alpha": 0.25})),
     "7 of 10 mistakes": Tried(("random-override", {"probability": 0.7})),
-    "every other episode": Tried(("turns", {"share": 0.5})),
-    "a contrast is left": Tried(("contrast", {"left": 0.2})),
     "slips by a mirror": Tried(("mirrored", {"alpha": 0.2})),
 }  # fmt: skip
 

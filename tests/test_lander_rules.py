@@ -12,16 +12,14 @@ import pytest
 from qbumpers import make_assistant
 from qbumpers.conformance import check_conformance
 from qbumpers.decisions import Model, Noise, Situation, Step
+from qbumpers.tasks.corridors import vector_corridor
 from qbumpers.tasks.dynamics import TERMINATED
 
 DOCS = Path(__file__).parents[1] / "docs"
 VALUES = np.array([3.0, 10.0, 8.0, 9.5])
 MODEL = Model(0, 2, 4, -1, 0.9, None, 1 - np.eye(4))
-COINS = (np.arange(10_000) + 0.5) / 10_000
 RULES = {
     "scheduled-bumpers": {"begin": 0.5, "over": 10, "until": 30},
-    "turns": {"share": 0.5},
-    "contrast": {"left": 0.5},
     "recent": {"alpha": 0.5},
     "watchful": {"alpha": 1.0},
     "governed": {"share": 0.1},
@@ -69,22 +67,6 @@ def test_scheduled_bumpers_are_bumpers_of_the_alpha_of_the_episode(script):
             assert found == pytest.approx(bumpers(alpha, proposed=proposed))
     assert bumpers(1.0) > 0
     assert probability(assistant, episode=20) == 0
-
-
-def test_turns_help_with_everything_in_their_share_of_the_episodes(script):
-    assistant = make_assistant("turns", share=0.25)
-    found = [probability(assistant, proposed=3, episode=episode) for episode in range(8)]
-    assert found == [bumpers(1.0, proposed=3)] * 3 + [1.0] + [bumpers(1.0, proposed=3)] * 3 + [1.0]
-
-
-@pytest.mark.parametrize("left", [0.0, 0.25, 1.0])
-def test_a_contrast_is_left_between_a_mistake_and_the_best(script, left):
-    assistant = make_assistant("contrast", left=left)
-    for proposed, value in ((0, 3.0), (2, 8.0), (3, 9.5)):
-        place = situation(proposed=proposed)
-        executed = [assistant.decide(place, Noise(coin, 0.0)).action for coin in COINS]
-        credit = VALUES[executed].mean()
-        assert 10.0 - credit == pytest.approx(min(left, 10.0 - value), abs=1e-3)
 
 
 def test_losses_of_late_count_most(script):
@@ -143,7 +125,7 @@ def test_a_mirror_credits_the_proposal_and_lets_pass_what_is_meant(script):
 def test_a_tried_rule_does_the_same_in_every_host(script, name):
     assistant = make_assistant(name, **RULES[name])
     assert assistant.compiled
-    assert all(found.steps for found in check_conformance(assistant))
+    assert all(found.steps for found in check_conformance(assistant, tasks=[vector_corridor()]))
 
 
 def rows(returns):
