@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from qbumpers import make_assistant
+from qbumpers import make_assistant, shipped_expert
 from qbumpers.conformance import check_conformance
 from qbumpers.decisions import Model, Noise, Situation, Step
 from qbumpers.tasks.corridors import vector_corridor
@@ -151,6 +151,7 @@ def test_the_verdict_names_what_is_ahead_and_what_is_beyond_the_frontier(script,
 
 @pytest.mark.slow
 def test_what_was_tried_can_be_measured_again(tmp_path):
+    shipped_expert("lunar-lander").save(tmp_path / "corrected.npz")  # correcting takes minutes
     command = [sys.executable, str(DOCS / "run_lander_rules.py"), str(tmp_path)]
     given = ("--learners", "1", "--episodes", "2")
     once, again = (
@@ -158,4 +159,4 @@ def test_what_was_tried_can_be_measured_again(tmp_path):
         for _ in range(2)
     )
     assert "Beyond the frontier of all settings of bumpers" in once
-    assert again == once.replace("correcting the expert's values ...\n", "")
+    assert again == once
