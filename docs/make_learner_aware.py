@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import make_pictures as pictures
+from lander_picture import lander_picture
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from writing import DOCS, number, template
@@ -80,6 +81,7 @@ def write(folder: Path) -> None:
         path.stem.replace("-", "_"): json.loads(path.read_text(encoding="utf-8"))
         for path in sorted(DATA.glob("*.json"))
     }
+    pictures.keep(lander_picture(data["lunar_lander"]["rules"]), images, "learner-aware-lander")
     page = template("learner-aware.md.j2", signed).render(data)
     (folder / "learner-aware.md").write_text(page, encoding="utf-8")
 

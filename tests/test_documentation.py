@@ -318,7 +318,8 @@ def test_the_reproduction_page_says_what_its_script_finds(tmp_path):
 
 
 def test_the_page_on_learner_aware_bumpers_says_what_was_measured(tmp_path):
-    assert make("make_learner_aware.py", tmp_path) == {"learner-aware.png"}
+    pictures = make("make_learner_aware.py", tmp_path)
+    assert pictures == {"learner-aware.png", "learner-aware-lander.png"}
     fresh = (tmp_path / "learner-aware.md").read_text(encoding="utf-8")
     assert (DOCS / "learner-aware.md").read_text(encoding="utf-8") == fresh
 
