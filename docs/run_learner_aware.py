@@ -23,7 +23,7 @@ from qbumpers.tasks.random_mdp import random_mdp
 from qbumpers.values import learn_values
 
 DATA = Path(__file__).with_name("data") / "learner-aware"
-SEED, REFERENCE_TRIALS, POINT_TRIALS = 41, 1_000, 2_000
+SEED, REFERENCE_TRIALS, POINT_TRIALS = 43, 1_000, 2_000
 ALPHAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0)
 """Of bumpers, whose alpha ends at 1, those above are had with a lower `v_min`."""
 
@@ -228,7 +228,7 @@ def part_points(trials: int | None) -> Any:
         ("text", (75.0, -250.0)),
         ("text", (50.0, -107.0)),
     )
-    alphas = sorted({*ALPHAS, 0.15, 0.17, 1.2})
+    alphas = sorted({*ALPHAS, 0.15, 0.16, 1.05, 1.2})
     for profile in PROFILES:
         learner = q_learner(task, profile)
         for alpha in alphas:
