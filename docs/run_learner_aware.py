@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from learner_aware_filter import TOLD, shares_by_episode
+from learner_aware_speed import nanoseconds
 
 from qbumpers import make_assistant, make_task, simulate, solve
 from qbumpers.analysis.hypervolume import hypervolume
+from qbumpers.assistants.mirrors import PERCEPTIONS
 from qbumpers.learners import Motor, QLearner, make_learner
 from qbumpers.learners.schedules import Schedule
 from qbumpers.tasks import TabularTask, Task, cliff_walking
@@ -23,7 +26,10 @@ from qbumpers.tasks.random_mdp import random_mdp
 from qbumpers.values import learn_values
 
 DATA = Path(__file__).with_name("data") / "learner-aware"
-SEED, REFERENCE_TRIALS, POINT_TRIALS = 43, 1_000, 2_000
+SEED, REFERENCE_TRIALS, POINT_TRIALS, FILTER_TRIALS = 43, 1_000, 2_000, 60
+BLOCKS = ((0, 5), (5, 10), (10, 20), (20, 50), (50, 100))
+"""First episode, and the one after the last, of the parts of a course."""
+
 ALPHAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0)
 """Of bumpers, whose alpha ends at 1, those above are had with a lower `v_min`."""
 
@@ -31,8 +37,14 @@ PROFILES = {"figures": 0.9, "text": 0.1}
 """Share of the episodes over which exploration and learning rate of a profile fall."""
 
 RESAMPLES = 4_000
+SPEED = 3.0
+"""Million learner steps a second that are aimed at."""
+
 AWARE, MODEL_FREE = "learner-aware-bumpers", "model-free-learner-aware-bumpers"
-PERCEPTIONS = ("transition", "observant", "interruption")
+
+
+AIMS = (("figures", 75.0, -115.0), ("text", 75.0, -250.0), ("text", 50.0, -107.0))
+"""Profile, assisted return, unassisted return to be exceeded; -107 is that of practice alone."""
 
 
 class Measured(NamedTuple):
@@ -118,20 +130,20 @@ def methods(field: Field, profile: str, name: str = AWARE) -> dict[str, list[Any
 
 
 class Comparison(NamedTuple):
-    """Normalised hypervolumes of the rule and of bumpers, with their difference."""
+    """Normalised hypervolumes of the rule and of its rival, with their difference."""
 
     aware: float
-    bumpers: float
+    rival: float
     low: float
     high: float
     points: dict[str, list[list[float]]]
 
 
-def compared(field: Field, profile: str, trials: int, intervals: int, name: str) -> Comparison:
-    """Compare; the interval holds simultaneously with others (Bonferroni)."""
+def compared(field: Field, rules: dict[str, list[Any]], trials: int, intervals: int) -> Comparison:
+    """Compare the rule with its rivals; the interval holds at once with others (Bonferroni)."""
     found = {
         method: [samples(field.task, each, trials, **field.setup) for each in settings]
-        for method, settings in methods(field, profile, name).items()
+        for method, settings in rules.items()
     }
     box = float(np.prod(np.maximum(field.best - field.reference, 1e-9)))
 
@@ -140,7 +152,7 @@ def compared(field: Field, profile: str, trials: int, intervals: int, name: str)
 
     means = {method: [s.mean(axis=0) for s in each] for method, each in found.items()}
     covers = {method: float(covered(each)) for method, each in means.items()}
-    rival = max(("second", "best"), key=lambda method: covers[method])
+    rival = max((method for method in rules if method != "aware"), key=lambda each: covers[each])
     generator = np.random.default_rng(SEED)
     resampled = {
         method: covered([resample(s, generator) for s in found[method]])
@@ -169,13 +181,15 @@ def verdict(found: Comparison) -> str:
     return "not behind" if found.low > -0.02 else "behind" if found.high < 0 else "open"
 
 
-def show(title: str, rows: Iterable[tuple[str, Comparison]]) -> dict[str, Any]:
+def show(
+    title: str, rows: Iterable[tuple[str, Comparison]], rival: str = "bumpers"
+) -> dict[str, Any]:
     """Print comparisons as they are made; returns them for the page."""
-    print(f"\n{title}\n{'':34}   aware bumpers  difference", flush=True)
+    print(f"\n{title}\n{'':34}   aware {rival:>7}  difference", flush=True)
     kept = {}
     for name, found in rows:
         interval = f"{found.low:+.3f} .. {found.high:+.3f}"
-        numbers = f"{found.aware:8.3f}{found.bumpers:8.3f}  {interval}"
+        numbers = f"{found.aware:8.3f}{found.rival:8.3f}  {interval}"
         print(f"{name:34}{numbers}  {verdict(found)}", flush=True)
         kept[name] = {**found._asdict(), "verdict": verdict(found)}
     return kept
@@ -190,7 +204,8 @@ def tasks_compared(names: Iterable[str], rule: str, trials: int | None) -> Any:
             many = trials or measured.trials
             learner = q_learner(measured.make(), profile)
             field = field_of(measured, many, learner=learner)
-            yield f"{name}, {profile}", compared(field, profile, many, 2 * len(names), rule)
+            rules = methods(field, profile, rule)
+            yield f"{name}, {profile}", compared(field, rules, many, 2 * len(names))
 
 
 def part_tasks(trials: int | None) -> Any:
@@ -214,20 +229,43 @@ def part_perceptions(trials: int | None) -> Any:
             for profile in PROFILES:
                 learner = q_learner(measured.make(), profile)
                 field = field_of(measured, many, learner=learner, perception=perception)
-                yield f"{perception}, {profile}", compared(field, profile, many, 6, AWARE)
+                rules = methods(field, profile)
+                yield f"{perception}, {profile}", compared(field, rules, many, 6)
 
     return show("Cliff Walking, by perception", rows())
+
+
+def part_filter(trials: int | None) -> Any:
+    """What the filter believes by episode, and what it would be worth to be told the truth."""
+    measured, many = TASKS["cliff-walking"], trials or FILTER_TRIALS
+    task, shares = measured.make(), {}
+    ends = [end for _, end in BLOCKS]
+    print("\nCliff Walking: weight of the true perception by episode, up to", *ends)
+    for perception in PERCEPTIONS:
+        for profile in PROFILES:
+            learner = q_learner(task, profile)
+            found = shares_by_episode(task, learner, perception, 0.2, many, SEED)
+            blocks = [float(found[:, first:end].mean()) for first, end in BLOCKS]
+            shares[f"{perception}, {profile}"] = blocks
+            print(f"{perception + ', ' + profile:26}", *(f"{b:5.2f}" for b in blocks), flush=True)
+
+    def rows() -> Any:
+        for perception in PERCEPTIONS:
+            for profile in PROFILES:
+                learner = q_learner(task, profile)
+                field = field_of(measured, many, learner=learner, perception=perception)
+                place = PERCEPTIONS.index(perception)
+                told = [make_assistant(TOLD, alpha=alpha, perception=place) for alpha in ALPHAS]
+                rules = {"aware": methods(field, profile)["aware"], "told": told}
+                yield f"{perception}, {profile}", compared(field, rules, many, 6)
+
+    return {"shares": shares, "told": show("Against the same, told the perception", rows(), "told")}
 
 
 def part_points(trials: int | None) -> Any:
     """Points at Cliff Walking that were aimed at."""
     task, kept = cliff_walking(), {}
     print("\nCliff Walking, transition learners: assisted / unassisted (standard errors)")
-    aims = (
-        ("figures", (75.0, -115.0)),
-        ("text", (75.0, -250.0)),
-        ("text", (50.0, -107.0)),
-    )
     alphas = sorted({*ALPHAS, 0.15, 0.16, 1.05, 1.2})
     for profile in PROFILES:
         learner = q_learner(task, profile)
@@ -242,24 +280,52 @@ def part_points(trials: int | None) -> Any:
                 f"{mean[1]:8.1f} ({error[1]:.0f})",
                 flush=True,
             )
-    for profile, (assisted, unassisted) in aims:
-        far_enough = {
-            name.split()[1]: (u - unassisted) / spread
-            for name, (a, u, _, spread) in kept.items()
-            if name.startswith(profile) and a >= assisted
-        }
-        alpha = max(far_enough, key=lambda each: far_enough[each])
-        above = far_enough[alpha]
-        said = "reached" if above > 2 else "reached by the mean alone" if above > 0 else "missed"
+    for aim in aimed(kept):
         print(
-            f"{profile}: {assisted:g} assisted and more than {unassisted:g} unassisted: {said}, "
-            f"{above:+.1f} standard errors at alpha {alpha}"
+            f"{aim.profile}: {aim.assisted:g} assisted and more than {aim.unassisted:g} "
+            f"unassisted: {aim.verdict}, {aim.above:+.1f} standard errors at alpha {aim.alpha}"
         )
     return kept
 
 
+class Aim(NamedTuple):
+    """A point that was aimed at, and the alpha that comes furthest beyond it.
+
+    Attributes:
+        profile: of the learner.
+        assisted: the least return.
+        unassisted: the return to be exceeded.
+        alpha: of those that return enough assisted.
+        above: standard errors of the unassisted return by which it is exceeded.
+        verdict: reached if by more than two.
+    """
+
+    profile: str
+    assisted: float
+    unassisted: float
+    alpha: str
+    above: float
+    verdict: str
+
+
+def aimed(points: dict[str, list[float]]) -> list[Aim]:
+    """What came of the points that were aimed at, from the rows of `part_points`."""
+    found = []
+    for profile, assisted, unassisted in AIMS:
+        above = {
+            name.split()[1]: (learned - unassisted) / error
+            for name, (helped, learned, _, error) in points.items()
+            if name.startswith(profile) and helped >= assisted
+        }
+        alpha = max(above, key=lambda each: above[each])
+        most = above[alpha]
+        verdict = "reached" if most > 2 else "reached by the mean alone" if most > 0 else "missed"
+        found.append(Aim(profile, assisted, unassisted, alpha, most, verdict))
+    return found
+
+
 def part_speed(trials: int | None) -> Any:
-    """Million learner steps per second of processor time, one core."""
+    """Million learner steps per second of processor time on one core, and what takes them."""
     task, kept = cliff_walking(), {}
     print("\nMillion learner steps a second, one core")
     for profile in PROFILES:
@@ -270,9 +336,14 @@ def part_speed(trials: int | None) -> Any:
                 begin = time.process_time()
                 found = simulate(task, make_assistant(AWARE, alpha=alpha), seed=seed, **setup)
                 rates.append(found.steps / (time.process_time() - begin) / 1e6)
-            kept[f"{profile} {alpha:g}"] = statistics.median(rates[1:])
-            print(f"{profile:8} alpha {alpha:g}: {kept[f'{profile} {alpha:g}']:.2f}", flush=True)
-    return kept
+            rate = kept[f"{profile} {alpha:g}"] = statistics.median(rates[1:])
+            said = "reached" if rate >= SPEED else "missed"
+            print(f"{profile:8} alpha {alpha:g}: {rate:.2f}, {SPEED:g} {said}", flush=True)
+    pieces = nanoseconds()
+    print(f"Nanoseconds of a piece, of the {1e3 / SPEED:.0f} that {SPEED:g} million leave a step")
+    for name, each in pieces.items():
+        print(f"{name:46}{each:6.0f}")
+    return {"rates": kept, "pieces": pieces}
 
 
 def other_learners(task: TabularTask) -> dict[str, dict[str, Any]]:
@@ -336,6 +407,10 @@ def part_robust(trials: int | None) -> Any:
             f"{each['score']:6.2f} ({each['regret']:.2f})   "
             for method, each in kept[name].items()
         ), flush=True)  # fmt: skip
+    regrets = {name: each["aware"]["regret"] for name, each in kept.items()}
+    worst = max(regrets, key=lambda name: regrets[name])
+    behind = [n for n, each in kept.items() if each["aware"]["score"] < each["best"]["score"]]
+    print(f"Largest regret {regrets[worst]:.2f}, {worst}; behind bumpers: {behind or 'nowhere'}")
     return kept
 
 
@@ -343,6 +418,7 @@ PARTS = {
     "points": part_points,
     "tasks": part_tasks,
     "perceptions": part_perceptions,
+    "filter": part_filter,
     "robust": part_robust,
     "model-free": part_model_free,
     "speed": part_speed,
@@ -351,10 +427,16 @@ PARTS = {
 
 def main() -> None:
     """Measure what was asked for, and keep the numbers of full runs."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="parts:\n" + "\n".join(f"  {n:12} {part.__doc__}" for n, part in PARTS.items()),
+    )  # fmt: skip
+    parser.add_argument("parts", nargs="*", metavar="PART", help="all of them if none is named")
     parser.add_argument("--trials", type=int, help="of every condition; nothing is kept then")
     given = parser.parse_args()
+    for name in given.parts:
+        if name not in PARTS:
+            parser.error(f"there is no part {name!r}; there are {', '.join(PARTS)}")
     for name in given.parts or PARTS:
         kept = PARTS[name](given.trials)
         if given.trials is None:
