@@ -167,4 +167,7 @@ def show(
         numbers = f"{found.aware:8.3f}{found.rival:8.3f}  {interval}"
         print(f"{name:34}{numbers}  {verdict(found)}", flush=True)
         kept[name] = {**found._asdict(), "verdict": verdict(found)}
+    ahead = sum(each["verdict"] == "ahead" for each in kept.values())
+    lowest = min(each["low"] for each in kept.values())
+    print(f"ahead in {ahead} of {len(kept)}; the lowest end of an interval is {lowest:+.3f}")
     return kept
