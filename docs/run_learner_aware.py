@@ -8,177 +8,46 @@ import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from learner_aware_fields import (
+    ALPHAS,
+    AWARE,
+    MODEL_FREE,
+    PROFILES,
+    SEED,
+    STOCHASTIC,
+    TASKS,
+    compared,
+    field_of,
+    methods,
+    q_learner,
+    samples,
+    show,
+)
+from learner_aware_filter import TOLD, shares_by_episode
+from learner_aware_speed import nanoseconds
 
-from qbumpers import make_assistant, make_task, simulate, solve
-from qbumpers.analysis.hypervolume import hypervolume
+from qbumpers import make_assistant, simulate
+from qbumpers.assistants.mirrors import PERCEPTIONS
 from qbumpers.learners import Motor, QLearner, make_learner
 from qbumpers.learners.schedules import Schedule
-from qbumpers.tasks import TabularTask, Task, cliff_walking
-from qbumpers.tasks.random_mdp import random_mdp
+from qbumpers.tasks import TabularTask, cliff_walking
 from qbumpers.values import learn_values
 
 DATA = Path(__file__).with_name("data") / "learner-aware"
-SEED, REFERENCE_TRIALS, POINT_TRIALS = 41, 1_000, 2_000
-ALPHAS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0)
-"""Of bumpers, whose alpha ends at 1, those above are had with a lower `v_min`."""
+POINT_TRIALS, FILTER_TRIALS = 2_000, 60
+BLOCKS = ((0, 5), (5, 10), (10, 20), (20, 50), (50, 100))
+"""First episode, and the one after the last, of the parts of a course."""
 
-PROFILES = {"figures": 0.9, "text": 0.1}
-"""Share of the episodes over which exploration and learning rate of a profile fall."""
+SPEED = 3.0
+"""Million learner steps a second that are aimed at."""
 
-RESAMPLES = 4_000
-AWARE, MODEL_FREE = "learner-aware-bumpers", "model-free-learner-aware-bumpers"
-PERCEPTIONS = ("transition", "observant", "interruption")
-
-
-class Measured(NamedTuple):
-    """A task with the worst return that bumpers know of, and how many trials are affordable."""
-
-    make: Callable[[], Any]
-    v_min: float
-    trials: int
-
-
-TASKS = {
-    "cliff-walking": Measured(lambda: make_task("cliff-walking"), 0.0, 150),
-    "larger-cliff": Measured(lambda: make_task("larger-cliff"), 0.0, 40),
-    "frozen-lake": Measured(lambda: make_task("frozen-lake"), 0.0, 150),
-    "frozen-lake-8x8": Measured(lambda: make_task("frozen-lake-8x8"), 0.0, 60),
-    "taxi": Measured(lambda: make_task("taxi"), -20.0, 30),
-    "windy-gridworld": Measured(lambda: make_task("windy-gridworld"), -100.0, 100),
-    "inventory": Measured(lambda: make_task("inventory"), 0.0, 60),
-    "random-mdp": Measured(lambda: random_mdp(10), 0.0, 150),
-}
-STOCHASTIC = ("frozen-lake", "inventory", "random-mdp")
-
-
-def q_learner(task: Task, profile: str) -> QLearner:
-    """The learner of a profile."""
-    schedule = Schedule(1.0, 0.02, PROFILES[profile])
-    return QLearner(task.discount, schedule, schedule)
-
-
-def bumpers(alpha: float, v_min: float, start_value: float, **options: Any) -> Any:
-    """Bumpers whose alpha may exceed 1: then `v_min` lies that much lower."""
-    lower = start_value - max(alpha, 1.0) * (start_value - v_min)
-    return make_assistant("stochastic-q-bumpers", alpha=min(alpha, 1.0), v_min=lower, **options)
-
-
-def samples(task: Task, assistant: Any, trials: int, **setup: Any) -> np.ndarray:
-    """Assisted and unassisted returns by trial, float64 [T, 2]."""
-    found = simulate(task, assistant, trials=trials, seed=SEED, **setup).outcomes
-    return np.stack([found.assisted_return, found.unassisted_return]).mean(axis=2).T
-
-
-class Field(NamedTuple):
-    """The field in which methods are compared: a learner at a task.
-
-    Attributes:
-        task: what is learned.
-        measured: how it is measured.
-        setup: learner, perception and so on.
-        reference: float64 [2], assisted return of `none`, unassisted of `maximal`.
-        best: return of `maximal`, assisted.
-        start_value: the lowest V*(s_0).
-    """
-
-    task: TabularTask
-    measured: Measured
-    setup: dict[str, Any]
-    reference: np.ndarray
-    best: float
-    start_value: float
-
-
-def field_of(measured: Measured, trials: int, **setup: Any) -> Field:
-    """Fix the reference point before anything is compared."""
-    task = measured.make()
-    many = min(REFERENCE_TRIALS, 5 * trials)
-    without = samples(task, "none", many, **setup).mean(axis=0)
-    maximal = samples(task, "maximal", many, **setup).mean(axis=0)
-    values = np.asarray(solve(task).table)
-    start_value = float(values[task.start > 0].max(axis=1).min())
-    reference = np.array([without[0], maximal[1]])
-    return Field(task, measured, setup, reference, float(maximal[0]), start_value)
-
-
-def methods(field: Field, profile: str, name: str = AWARE) -> dict[str, list[Any]]:
-    """The rule, and two kinds of bumpers, with equally many settings."""
-    v_min, start = field.measured.v_min, field.start_value
-    literal = {"escalate": profile == "figures", "clip": profile == "figures"}
-    return {
-        "aware": [make_assistant(name, alpha=alpha, v_min=v_min) for alpha in ALPHAS],
-        "second": [bumpers(a, v_min, start, second=True, **literal) for a in ALPHAS],
-        "best": [bumpers(a, v_min, start) for a in ALPHAS],
-    }
-
-
-class Comparison(NamedTuple):
-    """Normalised hypervolumes of the rule and of bumpers, with their difference."""
-
-    aware: float
-    bumpers: float
-    low: float
-    high: float
-    points: dict[str, list[list[float]]]
-
-
-def compared(field: Field, profile: str, trials: int, intervals: int, name: str) -> Comparison:
-    """Compare; the interval holds simultaneously with others (Bonferroni)."""
-    found = {
-        method: [samples(field.task, each, trials, **field.setup) for each in settings]
-        for method, settings in methods(field, profile, name).items()
-    }
-    box = float(np.prod(np.maximum(field.best - field.reference, 1e-9)))
-
-    def covered(many: list[np.ndarray]) -> np.ndarray:
-        return hypervolume(np.stack(many, axis=-2), field.reference) / box
-
-    means = {method: [s.mean(axis=0) for s in each] for method, each in found.items()}
-    covers = {method: float(covered(each)) for method, each in means.items()}
-    rival = max(("second", "best"), key=lambda method: covers[method])
-    generator = np.random.default_rng(SEED)
-    resampled = {
-        method: covered([resample(s, generator) for s in found[method]])
-        for method in ("aware", rival)
-    }
-    tail = 100 * 0.05 / intervals / 2
-    low, high = np.percentile(resampled["aware"] - resampled[rival], [tail, 100 - tail])
-    points = {
-        method: [[*map(float, mean), *map(float, s.std(axis=0) / np.sqrt(len(s)))]
-                 for mean, s in zip(means[method], found[method], strict=True)]
-        for method in ("aware", rival)
-    }  # fmt: skip
-    return Comparison(covers["aware"], covers[rival], float(low), float(high), points)
-
-
-def resample(rows: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-    """Means of resampled trials, float64 [RESAMPLES, 2]."""
-    weights = generator.multinomial(len(rows), np.full(len(rows), 1 / len(rows)), RESAMPLES)
-    return weights @ rows / len(rows)
-
-
-def verdict(found: Comparison) -> str:
-    """What the interval says."""
-    if found.low > 0:
-        return "ahead"
-    return "not behind" if found.low > -0.02 else "behind" if found.high < 0 else "open"
-
-
-def show(title: str, rows: Iterable[tuple[str, Comparison]]) -> dict[str, Any]:
-    """Print comparisons as they are made; returns them for the page."""
-    print(f"\n{title}\n{'':34}   aware bumpers  difference", flush=True)
-    kept = {}
-    for name, found in rows:
-        interval = f"{found.low:+.3f} .. {found.high:+.3f}"
-        numbers = f"{found.aware:8.3f}{found.bumpers:8.3f}  {interval}"
-        print(f"{name:34}{numbers}  {verdict(found)}", flush=True)
-        kept[name] = {**found._asdict(), "verdict": verdict(found)}
-    return kept
+AIMS = (("figures", 75.0, -115.0), ("text", 75.0, -250.0), ("text", 50.0, -107.0))
+"""Profile, assisted return, unassisted return to be exceeded; -107 is that of practice alone."""
 
 
 def tasks_compared(names: Iterable[str], rule: str, trials: int | None) -> Any:
@@ -190,7 +59,8 @@ def tasks_compared(names: Iterable[str], rule: str, trials: int | None) -> Any:
             many = trials or measured.trials
             learner = q_learner(measured.make(), profile)
             field = field_of(measured, many, learner=learner)
-            yield f"{name}, {profile}", compared(field, profile, many, 2 * len(names), rule)
+            rules = methods(field, profile, rule)
+            yield f"{name}, {profile}", compared(field, rules, many, 2 * len(names))
 
 
 def part_tasks(trials: int | None) -> Any:
@@ -214,21 +84,44 @@ def part_perceptions(trials: int | None) -> Any:
             for profile in PROFILES:
                 learner = q_learner(measured.make(), profile)
                 field = field_of(measured, many, learner=learner, perception=perception)
-                yield f"{perception}, {profile}", compared(field, profile, many, 6, AWARE)
+                rules = methods(field, profile)
+                yield f"{perception}, {profile}", compared(field, rules, many, 6)
 
     return show("Cliff Walking, by perception", rows())
+
+
+def part_filter(trials: int | None) -> Any:
+    """What the filter believes by episode, and what it would be worth to be told the truth."""
+    measured, many = TASKS["cliff-walking"], trials or FILTER_TRIALS
+    task, shares = measured.make(), {}
+    ends = [end for _, end in BLOCKS]
+    print("\nCliff Walking: weight of the true perception by episode, up to", *ends)
+    for perception in PERCEPTIONS:
+        for profile in PROFILES:
+            learner = q_learner(task, profile)
+            found = shares_by_episode(task, learner, perception, 0.2, many, SEED)
+            blocks = [float(found[:, first:end].mean()) for first, end in BLOCKS]
+            shares[f"{perception}, {profile}"] = blocks
+            print(f"{perception + ', ' + profile:26}", *(f"{b:5.2f}" for b in blocks), flush=True)
+
+    def rows() -> Any:
+        for perception in PERCEPTIONS:
+            for profile in PROFILES:
+                learner = q_learner(task, profile)
+                field = field_of(measured, many, learner=learner, perception=perception)
+                place = PERCEPTIONS.index(perception)
+                told = [make_assistant(TOLD, alpha=alpha, perception=place) for alpha in ALPHAS]
+                rules = {"aware": methods(field, profile)["aware"], "told": told}
+                yield f"{perception}, {profile}", compared(field, rules, many, 6)
+
+    return {"shares": shares, "told": show("Against the same, told the perception", rows(), "told")}
 
 
 def part_points(trials: int | None) -> Any:
     """Points at Cliff Walking that were aimed at."""
     task, kept = cliff_walking(), {}
     print("\nCliff Walking, transition learners: assisted / unassisted (standard errors)")
-    aims = (
-        ("figures", (75.0, -115.0)),
-        ("text", (75.0, -250.0)),
-        ("text", (50.0, -107.0)),
-    )
-    alphas = sorted({*ALPHAS, 0.15, 0.17, 1.2})
+    alphas = sorted({*ALPHAS, 0.15, 0.16, 1.05, 1.2})
     for profile in PROFILES:
         learner = q_learner(task, profile)
         for alpha in alphas:
@@ -242,24 +135,52 @@ def part_points(trials: int | None) -> Any:
                 f"{mean[1]:8.1f} ({error[1]:.0f})",
                 flush=True,
             )
-    for profile, (assisted, unassisted) in aims:
-        far_enough = {
-            name.split()[1]: (u - unassisted) / spread
-            for name, (a, u, _, spread) in kept.items()
-            if name.startswith(profile) and a >= assisted
-        }
-        alpha = max(far_enough, key=lambda each: far_enough[each])
-        above = far_enough[alpha]
-        said = "reached" if above > 2 else "reached by the mean alone" if above > 0 else "missed"
+    for aim in aimed(kept):
         print(
-            f"{profile}: {assisted:g} assisted and more than {unassisted:g} unassisted: {said}, "
-            f"{above:+.1f} standard errors at alpha {alpha}"
+            f"{aim.profile}: {aim.assisted:g} assisted and more than {aim.unassisted:g} "
+            f"unassisted: {aim.verdict}, {aim.above:+.1f} standard errors at alpha {aim.alpha}"
         )
     return kept
 
 
+class Aim(NamedTuple):
+    """A point that was aimed at, and the alpha that comes furthest beyond it.
+
+    Attributes:
+        profile: of the learner.
+        assisted: the least return.
+        unassisted: the return to be exceeded.
+        alpha: of those that return enough assisted.
+        above: standard errors of the unassisted return by which it is exceeded.
+        verdict: reached if by more than two.
+    """
+
+    profile: str
+    assisted: float
+    unassisted: float
+    alpha: str
+    above: float
+    verdict: str
+
+
+def aimed(points: dict[str, list[float]]) -> list[Aim]:
+    """What came of the points that were aimed at, from the rows of `part_points`."""
+    found = []
+    for profile, assisted, unassisted in AIMS:
+        above = {
+            name.split()[1]: (learned - unassisted) / error
+            for name, (helped, learned, _, error) in points.items()
+            if name.startswith(profile) and helped >= assisted
+        }
+        alpha = max(above, key=lambda each: above[each])
+        most = above[alpha]
+        verdict = "reached" if most > 2 else "reached by the mean alone" if most > 0 else "missed"
+        found.append(Aim(profile, assisted, unassisted, alpha, most, verdict))
+    return found
+
+
 def part_speed(trials: int | None) -> Any:
-    """Million learner steps per second of processor time, one core."""
+    """Million learner steps per second of processor time on one core, and what takes them."""
     task, kept = cliff_walking(), {}
     print("\nMillion learner steps a second, one core")
     for profile in PROFILES:
@@ -270,9 +191,14 @@ def part_speed(trials: int | None) -> Any:
                 begin = time.process_time()
                 found = simulate(task, make_assistant(AWARE, alpha=alpha), seed=seed, **setup)
                 rates.append(found.steps / (time.process_time() - begin) / 1e6)
-            kept[f"{profile} {alpha:g}"] = statistics.median(rates[1:])
-            print(f"{profile:8} alpha {alpha:g}: {kept[f'{profile} {alpha:g}']:.2f}", flush=True)
-    return kept
+            rate = kept[f"{profile} {alpha:g}"] = statistics.median(rates[1:])
+            said = "reached" if rate >= SPEED else "missed"
+            print(f"{profile:8} alpha {alpha:g}: {rate:.2f}, {SPEED:g} {said}", flush=True)
+    pieces = nanoseconds()
+    print(f"Nanoseconds of a piece, of the {1e3 / SPEED:.0f} that {SPEED:g} million leave a step")
+    for name, each in pieces.items():
+        print(f"{name:46}{each:6.0f}")
+    return {"rates": kept, "pieces": pieces}
 
 
 def other_learners(task: TabularTask) -> dict[str, dict[str, Any]]:
@@ -336,6 +262,10 @@ def part_robust(trials: int | None) -> Any:
             f"{each['score']:6.2f} ({each['regret']:.2f})   "
             for method, each in kept[name].items()
         ), flush=True)  # fmt: skip
+    regrets = {name: each["aware"]["regret"] for name, each in kept.items()}
+    worst = max(regrets, key=lambda name: regrets[name])
+    behind = [n for n, each in kept.items() if each["aware"]["score"] < each["best"]["score"]]
+    print(f"Largest regret {regrets[worst]:.2f}, {worst}; behind bumpers: {behind or 'nowhere'}")
     return kept
 
 
@@ -343,6 +273,7 @@ PARTS = {
     "points": part_points,
     "tasks": part_tasks,
     "perceptions": part_perceptions,
+    "filter": part_filter,
     "robust": part_robust,
     "model-free": part_model_free,
     "speed": part_speed,
@@ -351,10 +282,16 @@ PARTS = {
 
 def main() -> None:
     """Measure what was asked for, and keep the numbers of full runs."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="parts:\n" + "\n".join(f"  {n:12} {part.__doc__}" for n, part in PARTS.items()),
+    )  # fmt: skip
+    parser.add_argument("parts", nargs="*", metavar="PART", help="all of them if none is named")
     parser.add_argument("--trials", type=int, help="of every condition; nothing is kept then")
     given = parser.parse_args()
+    for name in given.parts:
+        if name not in PARTS:
+            parser.error(f"there is no part {name!r}; there are {', '.join(PARTS)}")
     for name in given.parts or PARTS:
         kept = PARTS[name](given.trials)
         if given.trials is None:

@@ -10,6 +10,7 @@ EPSILONS = (0.01, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0)
 PRIOR = {"transition": 0.98, "observant": 0.01, "interruption": 0.01}
 WITHIN, BETWEEN, CHANGE = 1e-3, 1e-6, 0.1
 REMEMBERED = 10
+LEARNS = 0.1
 
 
 def close(gap, blur):
@@ -73,13 +74,12 @@ class PlainLearnerAware:
         return float(sum(leading))
 
     def chances(self, state, proposed):
-        """Joint probability of every mirror, way to choose, and proposal that is meant or not."""
+        """Joint probability of every mirror and way to choose, the proposal included."""
         found = {}
         for mirror, way in itertools.product(self.mirrors, itertools.product(BLURS, EPSILONS)):
             blur, epsilon = way
             meant = (1 - epsilon) * mirror.means(state, proposed, blur, self.loss)
-            found[mirror, way, "meant"] = mirror.weights[way] * meant
-            found[mirror, way, "slip"] = mirror.weights[way] * epsilon / self.task.actions
+            found[mirror, way] = mirror.weights[way] * (meant + epsilon / self.task.actions)
         total = sum(found.values())
         return {key: chance / total for key, chance in found.items()}
 
@@ -98,11 +98,14 @@ class PlainLearnerAware:
             total += (share / mirror.rate * expected) if share >= 1e-3 else 0.0
         return total
 
-    def help(self, situation, noise, lost, allowed, shares):
-        values = situation.values.tolist()
+    def help(self, situation, noise, lost, allowed, shares, learns):
+        values, proposed = situation.values.tolist(), situation.proposed
         merits: list[float | None] = [None] * len(values)
+        candidates = {a for a, v in enumerate(values) if v > values[proposed] and lost[a] < allowed}
+        if learns and lost[proposed] < 0.5 * allowed:
+            candidates.add(proposed)
         for action, value in enumerate(values):
-            if value > values[situation.proposed] and lost[action] < allowed:
+            if action in candidates:
                 credit = sum(
                     share * self.target(mirror, situation, action)
                     for mirror, share in shares.items()
@@ -123,25 +126,37 @@ class PlainLearnerAware:
         lost = [situation.start_value - situation.earned - situation.discount * v for v in values]
         chances = self.chances(situation.state, proposed)
         shares = dict.fromkeys(self.mirrors, 0.0)
-        unnoticed = {"meant": 0.0, "slip": 0.0}
-        for (mirror, _, kind), chance in chances.items():
+        for (mirror, _), chance in chances.items():
             shares[mirror] += chance
-            unnoticed[kind] += chance if mirror.perception == "transition" else 0.0
-        action = self.help(situation, noise, lost, allowed, shares)
+        unnoticed = sum(share for m, share in shares.items() if m.perception == "transition")
+        learns = sum(share * mirror.rate for mirror, share in shares.items()) >= LEARNS
+        action = self.help(situation, noise, lost, allowed, shares, learns)
+        if action == proposed:
+            return proposed, 0.0
         worth = self.harm(situation, action, shares) - self.harm(situation, proposed, shares)
         if values[action] - values[proposed] < self.alpha * worth:
             return proposed, 0.0
         ratio = lost[proposed] / allowed if allowed else 1.0
         due = logistic(ratio, 0.999) if 0 < ratio < 1 else float(ratio >= 1)
-        passing = (unnoticed["slip"] + unnoticed["meant"] / 2) * (1 - due)
+        lenient = min(1.0, abs(1 - self.alpha**2)) if learns else 0.0
+        passing = unnoticed * lenient * (1 - due)
         return (action if noise.coin < 1 - passing else proposed), 1 - passing
 
     def observe(self, step):
         if self.new:
             self.loss = max(step.values) - self.v_min
         chances = self.chances(step.state, step.proposed)
-        for mirror, way in itertools.product(self.mirrors, itertools.product(BLURS, EPSILONS)):
-            mirror.weights[way] = chances[mirror, way, "meant"] + chances[mirror, way, "slip"]
+        before = {p: sum(self.held(m) for m in self.mirrors if m.perception == p) for p in PRIOR}
+        learns = sum(m.rate * self.held(m) for m in self.mirrors) >= LEARNS
+        for (mirror, way), chance in chances.items():
+            mirror.weights[way] = chance
+        if not learns:  # what an override is to the learner stays as likely as it was
+            for perception in PRIOR:
+                of_it = [m for m in self.mirrors if m.perception == perception]
+                after = sum(self.held(m) for m in of_it)
+                for mirror in of_it:
+                    for way in mirror.weights:
+                        mirror.weights[way] *= before[perception] / after
         self.drift()
         ended = step.events & 1
         targets = [
@@ -156,11 +171,15 @@ class PlainLearnerAware:
         if self.new:
             self.change_rates()
 
+    @staticmethod
+    def held(mirror):
+        return sum(mirror.weights.values())
+
     def drift(self):
         ways = len(BLURS) * len(EPSILONS)
         for perception in PRIOR:
             of_it = [m for m in self.mirrors if m.perception == perception]
-            held = sum(sum(m.weights.values()) for m in of_it)
+            held = sum(self.held(m) for m in of_it)
             for mirror, way in itertools.product(of_it, itertools.product(BLURS, EPSILONS)):
                 mirror.weights[way] = (
                     (1 - WITHIN - BETWEEN) * mirror.weights[way]

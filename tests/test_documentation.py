@@ -326,12 +326,14 @@ def test_the_page_on_learner_aware_bumpers_says_what_was_measured(tmp_path):
 
 @pytest.mark.slow
 def test_learner_aware_bumpers_can_be_measured_again():
-    command = [sys.executable, str(DOCS / "run_learner_aware.py"), "points", "robust"]
+    command = [sys.executable, str(DOCS / "run_learner_aware.py"), "points", "robust", "filter"]
     printed = subprocess.run(
         [*command, "--trials", "2"], capture_output=True, text=True, check=True
     ).stdout
     assert len(re.findall(r"assisted and more than .*: (?:reached|missed)", printed)) == 3
     assert "estimated values" in printed
+    assert "Largest regret" in printed
+    assert len(re.findall(r"\.\. [+-][0-9.]+  (?:ahead|not behind|open|behind)", printed)) == 6
 
 
 @pytest.mark.slow

@@ -96,16 +96,57 @@ def test_a_mistake_is_let_happen_once_where_bumpers_never_would():
 
 
 def test_a_trifle_of_a_transition_learner_passes_the_likelier_the_less_it_costs():
-    # 1 of 87 alpha is lost, f = 1 / (1 + exp(2 log(0.001 / 0.999) (x - 1/2))). All is as likely
-    # meant as the mean of 1 - epsilon says, since all actions are believed to be equal.
-    lost, slip = 1 / (87 * 0.05), (0.01 + 0.03 + 0.1 + 0.25 + 0.5 + 0.75 + 1.0) / 7
+    # 1 of 87 alpha is lost, f = 1 / (1 + exp(2 log(0.001 / 0.999) (x - 1/2))). "Left" has become
+    # more than "up" is believed to bring, so that an override makes it look worse.
+    lost = 1 / (87 * 0.05)
     due = 1 / (1 + math.exp(2 * math.log(0.001 / 0.999) * (lost - 0.5)))
-    probability = 1 - 0.98 * (slip + (1 - slip) / 2) * (1 - due)
+    probability = 1 - 0.98 * (1 - 0.05**2) * (1 - due)
     assistant, memory = aware(0.05)
+    memory.mirrors.values[START], memory.mirrors.best[START] = 3.0, 3.0
+    memory.mirrors.values[START, RIGHT] = -60.0  # no choice of a learner, so that nothing is taught
     decision = assistant.decide(proposing(LEFT), Noise(probability - 1e-9, 0.0), memory)
     assert decision.action == UP
     assert decision.probability == pytest.approx(probability, abs=1e-12)
     assert assistant.decide(proposing(LEFT), Noise(probability + 1e-9, 0.0), memory).action == LEFT
+
+
+def test_a_proposal_happens_if_it_is_cheap_and_no_override_would_make_it_look_worse():
+    # Walking into the wall leads back here, and costs 1; "up" leads to where 3 is to be had.
+    assistant, memory = aware(1 / (0.5 * 87) + 1e-9)
+    memory.mirrors.best[24] = 3.0
+    assert assistant.decide(proposing(LEFT), NOISE, memory) == Decision(LEFT, 0.0)
+    dearer, memory_of_dearer = aware(1 / (0.5 * 87) - 1e-9)
+    memory_of_dearer.mirrors.best[24] = 3.0
+    assert dearer.decide(proposing(LEFT), NOISE, memory_of_dearer).action == UP
+    assert dearer.decide(proposing(LEFT), NOISE, memory_of_dearer).probability > 0
+
+
+@pytest.mark.parametrize("best_above", [0.0, 3.0])
+def test_nothing_passes_for_its_own_sake_once_a_learner_hardly_learns(best_above):
+    # Only the mirrors of rate 0.02 remain. A fall would be no lesson: "left" costs 1.
+    assistant, memory = aware(0.05)
+    memory.mirrors.best[24] = best_above
+    memory.mirrors.values[START, LEFT] = -60.0
+    weights = memory.mirrors.weights
+    weights[...] *= np.where(np.arange(MIRRORS) % 5 == 0, 1.0, 1e-9)
+    weights /= weights.sum()
+    decision = assistant.decide(proposing(LEFT), Noise(1 - 1e-12, 0.0), memory)
+    assert decision == Decision(UP, 1.0)
+
+
+def test_the_filter_keeps_to_what_overrides_are_while_a_learner_hardly_learns():
+    # A proposal that every transition learner means, and no other: believed only of who learns.
+    for slow, kept in ((True, True), (False, False)):
+        assistant, memory = aware(0.5)
+        memory.mirrors.values[24, LEFT, :5] = 9.0
+        memory.mirrors.values[24, UP, 5:] = 9.0
+        memory.mirrors.best[24] = 9.0
+        weights = memory.mirrors.weights
+        weights[...] = 0.0
+        weights[:, 0, [0, 5, 10] if slow else [2, 7, 12]] = 1 / 9
+        memory = after(assistant, memory, 24, LEFT, UP)
+        of_transition = memory.mirrors.weights[:, :, :5].sum()
+        assert of_transition == pytest.approx(1 / 3 if kept else 1.0, abs=0.02)
 
 
 def test_the_override_is_the_better_action_that_gets_the_least_credit():

@@ -7,7 +7,7 @@ import pytest
 from qbumpers import RequestError
 from qbumpers.decisions import Step
 from qbumpers.experiments.recordings import export_recording
-from qbumpers.experiments.steps import load_steps, save_steps
+from qbumpers.experiments.steps import load_steps, save_steps, steps_of
 from tests.experiments.examples import run_into
 from tests.fitting.records import bandit, walked
 
@@ -28,6 +28,14 @@ def test_steps_come_back_from_parquet(tmp_path):
     assert [*found] == ["first", "second"]
     for name, steps in found.items():
         assert_same(steps, people[name])
+
+
+def test_a_log_is_the_table_that_it_was():
+    table = walked("q-learning")
+    log = [Step(*(column[place] for column in table)) for place in range(len(table.episode))]
+    assert_same(steps_of(log), table)
+    with pytest.raises(RequestError, match="at least one step is needed"):
+        steps_of([])
 
 
 def test_steps_come_back_from_a_dataset_of_minari(tmp_path, monkeypatch):

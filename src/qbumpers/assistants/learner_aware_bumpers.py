@@ -11,12 +11,16 @@ looks ahead at what each would believe. A best action is executed. A proposal a 
    where H_k(e) is what the learner's own choices in s will cost once it has learned from e, and
    1 / rate_k how many updates that lasts; a choice that leads back to s is made again, so its cost
    counts up to 20 times more;
-2. else, if overrides would be taken for the learner's own doing, let pass with probability
-   1 - f(x(a)) if it is a slip and half of that if it is meant, f and x as of Stochastic Q Bumpers,
-   x(e) = (V*(s_0) - G(s, e)) / (alpha (V*(s_0) - v_min)): a trifle that happens misleads nobody;
+2. else let pass with probability p min(1, |1 - alpha^2|) (1 - f(x(a))): a trifle that happens
+   misleads nobody. p is the probability that an override would be taken for the learner's own
+   doing; f and x are those of Stochastic Q Bumpers, x(e) = (V*(s_0) - G(s, e)) / (alpha (V*(s_0) -
+   v_min)). Near alpha = 1 enough happens by 3; with a still lower floor the learner is left alone;
 3. else replaced by e, of the better actions within the floor, x(e) < 1, that with the least
    C(e) - 0.1 Q*(s, e), C the credit that a transition learner will give its own action: what it
-   proposed looks as bad as is safe. If there is none, e is a best action.
+   proposed looks as bad as is safe. The proposal itself is among them if x(a) < 0.5: what remains
+   of the floor is for overrides to come. If there is none, e is a best action.
+
+Once the learner hardly learns, its expected rate below 0.1, nothing passes by 2, or by 3.
 
 alpha may exceed 1: then the floor lies below `v_min`.
 """
@@ -27,8 +31,10 @@ import numpy as np
 from pydantic import Field
 
 from qbumpers.assistants.mirrors import (
+    LEARNS,
     MIRRORS,
     Mirrors,
+    Reading,
     between_episodes,
     blank_mirrors,
     lasting_harm,
@@ -45,8 +51,8 @@ from qbumpers.decisions import Decision, Model, Noise, Situation, Step, projecte
 from qbumpers.tasks.dynamics import ENDS, TERMINATED, Dynamics
 
 _LEANING = 0.1  # weight of the value against the credit, so that of equal credits the best wins
-_LENIENCE = 0.5  # towards trifles that are meant; those that are random, slips, all may pass
 _SURE = 0.999  # p_max of the logistic
+_SPENDABLE = 0.5  # of the floor, by a proposal that no override would make look worse
 _REPEATS = 20.0  # how often a choice that leads back to its state is made again
 
 
@@ -158,14 +164,21 @@ def lost_with(situation: Situation, action: int) -> float:
 
 @compiled
 def least_misleading(
-    situation: Situation, noise: Noise, allowed: float, shares: np.ndarray, targets: np.ndarray
+    situation: Situation, noise: Noise, allowed: float, reading: Reading, targets: np.ndarray
 ) -> int:
-    """The override: the better action within the floor that misleads least, else a best one."""
+    """What misleads least of the better actions within the floor, else a best action.
+
+    The proposal is one of them if it costs little of the floor and the learner still learns.
+    """
     values, proposed = situation.values, situation.proposed
     merits = scratch(len(values), -np.inf)
     for action in range(len(values)):
-        if values[action] > values[proposed] and lost_with(situation, action) < allowed:
-            merits[action] = _LEANING * values[action] - misled_credit(shares, targets[action])
+        limit = allowed if values[action] > values[proposed] else -np.inf
+        if action == proposed and reading.rate >= LEARNS:
+            limit = _SPENDABLE * allowed
+        if lost_with(situation, action) < limit:
+            credit = misled_credit(reading.shares, targets[action])
+            merits[action] = _LEANING * values[action] - credit
     best = best_value(merits)
     if best == -np.inf:
         return pick(values, best_value(values), noise.tie)
@@ -220,17 +233,20 @@ def weighed(
     proposed, loss = situation.proposed, situation.start_value - v_min
     allowed = alpha * loss
     reading = read(mirrors, situation.state, proposed, loss)
-    action = least_misleading(situation, noise, allowed, reading.shares, outlook.targets)
+    action = least_misleading(situation, noise, allowed, reading, outlook.targets)
+    if action == proposed:
+        return Decision(proposed, 0.0)
     if is_lesson(situation, action, alpha, loss, mirrors, reading.shares, outlook):
         return Decision(proposed, 0.0)
+    lenient = min(1.0, abs(1 - alpha * alpha)) if reading.rate >= LEARNS else 0.0
     due = override_probability(lost_with(situation, proposed), allowed, _SURE, True)
-    probability = 1 - (reading.slip + _LENIENCE * reading.meant) * (1 - due)
+    probability = 1 - reading.unaware * lenient * (1 - due)
     return Decision(action if noise.coin < probability else proposed, probability)
 
 
 @register_assistant(
     "learner-aware-bumpers", LearnerAwareBumpersOptions, start=unaware, observe=aware,
-    check_start=check_floor, needs=("states", "dynamics"),
+    check_start=check_floor, needs=("states", "dynamics"), revision=2,
 )  # fmt: skip
 @compiled
 def learner_aware_bumpers(

@@ -42,6 +42,9 @@ _TRANSITION, _OBSERVANT = len(_RATES), 2 * len(_RATES)  # where the mirrors of e
 MIRRORS = len(PERCEPTIONS) * len(_RATES)
 _WAYS = len(_TEMPERATURES) * len(_EPSILONS)
 
+LEARNS = 0.1
+"""Expected learning rate below which a learner hardly learns any more."""
+
 _DRIFT_WITHIN, _DRIFT_BETWEEN = 1e-3, 1e-6  # per step: how fast a learner's ways may change
 _NEGLIGIBLE = 1e-3  # probability of a mirror that need not be looked at
 _CHANGE = 0.1  # per episode: probability that the learning rate has become a neighbouring one
@@ -68,13 +71,13 @@ class Reading(NamedTuple):
 
     Attributes:
         shares: float64 [K], probability of each mirror, the proposal included; sums to 1.
-        meant: probability that it is a transition learner's and meant.
-        slip: probability that it is a transition learner's and random.
+        unaware: probability that it is a transition learner's.
+        rate: expected learning rate.
     """
 
     shares: np.ndarray
-    meant: float
-    slip: float
+    unaware: float
+    rate: float
 
 
 @compiled
@@ -83,6 +86,15 @@ def _sum(numbers: np.ndarray, first: int, end: int) -> float:
     total = 0.0
     for k in range(first, end):
         total += numbers[k]
+    return total
+
+
+@compiled
+def expected_rate(shares: np.ndarray) -> float:
+    """Learning rate to expect by the probabilities [K] of the mirrors."""
+    total = 0.0
+    for k in range(MIRRORS):
+        total += shares[k] * _RATES[k % _PER_PERCEPTION]
     return total
 
 
@@ -150,50 +162,50 @@ def read(mirrors: Mirrors, state: int, action: int, loss: float) -> Reading:
     """
     chances, weights = scratch((len(_TEMPERATURES), MIRRORS), 0.0), mirrors.weights
     _find_choices(mirrors, state, action, loss, chances)
-    count = weights.shape[2]
-    deliberate, random = scratch(MIRRORS, 0.0), scratch(MIRRORS, 0.0)
+    count, shares = weights.shape[2], scratch(MIRRORS, 0.0)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
+            random = _EPSILONS[way] / mirrors.values.shape[1]
             for k in range(count):
-                weight = weights[tau, way, k]
-                deliberate[k] += weight * (1 - _EPSILONS[way]) * chances[tau, k]
-                random[k] += weight * _EPSILONS[way]
-    shares = scratch(MIRRORS, 0.0)
-    for k in range(count):
-        shares[k] = deliberate[k] + random[k] / mirrors.values.shape[1]
-    meant = _sum(deliberate, 0, _TRANSITION)
+                shares[k] += weights[tau, way, k] * (
+                    (1 - _EPSILONS[way]) * chances[tau, k] + random
+                )
     total = _sum(shares, 0, MIRRORS)
-    meant /= total
-    for k in range(count):
+    for k in range(MIRRORS):
         shares[k] /= total
-    return Reading(shares, meant, _sum(shares, 0, _TRANSITION) - meant)
+    return Reading(shares, _sum(shares, 0, _TRANSITION), expected_rate(shares))
 
 
 @compiled
 def _weigh(mirrors: Mirrors, step: Step, loss: float) -> None:
-    """Change the weights by a proposal, and let them drift."""
+    """Change the weights by a proposal, and let them drift.
+
+    How a learner takes overrides shows in what it learns from them: those of the perceptions stay
+    if it hardly learns.
+    """
     chances, weights = scratch((len(_TEMPERATURES), MIRRORS), 0.0), mirrors.weights
     _find_choices(mirrors, step.state, step.proposed, loss, chances)
     count = weights.shape[2]
-    shares, even = scratch(MIRRORS, 0.0), 1 / mirrors.values.shape[1]
+    before, after = scratch(MIRRORS, 0.0), scratch(MIRRORS, 0.0)
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
+            random = _EPSILONS[way] / mirrors.values.shape[1]
             for k in range(count):
-                weights[tau, way, k] *= (1 - _EPSILONS[way]) * chances[tau, k] + _EPSILONS[
-                    way
-                ] * even
-                shares[k] += weights[tau, way, k]
-    total = _sum(shares, 0, MIRRORS)
-    fresh = scratch(MIRRORS, 0.0)
+                before[k] += weights[tau, way, k]
+                weights[tau, way, k] *= (1 - _EPSILONS[way]) * chances[tau, k] + random
+                after[k] += weights[tau, way, k]
+    kept, fresh = scratch(MIRRORS, 0.0), scratch(MIRRORS, 0.0)
+    learns, total = expected_rate(before) >= LEARNS, _sum(after, 0, MIRRORS)
     for k in range(count):
         first = k - k % _PER_PERCEPTION
-        held = _sum(shares, first, first + _PER_PERCEPTION) / total
+        found = _sum(after, first, first + _PER_PERCEPTION)
+        held = found / total if learns else _sum(before, first, first + _PER_PERCEPTION)
+        kept[k] = (1 - _DRIFT_WITHIN - _DRIFT_BETWEEN) * held / found
         fresh[k] = (_DRIFT_WITHIN * held / _PER_PERCEPTION + _DRIFT_BETWEEN / MIRRORS) / _WAYS
-    kept = (1 - _DRIFT_WITHIN - _DRIFT_BETWEEN) / total
     for tau in range(len(_TEMPERATURES)):
         for way in range(len(_EPSILONS)):
             for k in range(count):
-                weights[tau, way, k] = kept * weights[tau, way, k] + fresh[k]
+                weights[tau, way, k] = kept[k] * weights[tau, way, k] + fresh[k]
 
 
 @compiled

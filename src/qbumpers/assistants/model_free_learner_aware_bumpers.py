@@ -120,7 +120,7 @@ def recalled(memory: Experience, state: int, values: np.ndarray) -> Outlook:
 
 @register_assistant(
     "model-free-learner-aware-bumpers", ModelFreeLearnerAwareBumpersOptions, start=no_experience,
-    observe=experienced, check_start=check_floor, needs=("states",),
+    observe=experienced, check_start=check_floor, needs=("states",), revision=2,
 )  # fmt: skip
 @compiled
 def model_free_learner_aware_bumpers(

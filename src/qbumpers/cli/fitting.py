@@ -100,10 +100,13 @@ def fit(
     """
     from qbumpers.experiments.steps import load_steps
     from qbumpers.fitting import fit as fit_learners
+    from qbumpers.fitting.compare import CHANCE
     from qbumpers.imports import import_modules
 
     with stoppable():
         import_modules(imports or (), "--import")
+        if out is not None:
+            _check_out(out)
         everybody = load_steps(steps)
         people = dict([*everybody.items()][:participants])
         total = sum(len(each.episode) for each in people.values())
@@ -123,8 +126,8 @@ def fit(
                 report=lambda done: bar.update(task, completed=done.done, total=done.of),
             )
         OUTPUT.print(_models(found))
-        OUTPUT.print(f"\nEstimates of [bold]{found.best}[/bold], means over participants:")
-        OUTPUT.print(_estimates(found))
+        if found.models["learner"][0] != CHANCE:
+            _print_estimates(found)
         OUTPUT.print(_verdict(found), soft_wrap=True)
         _warn_of_error(found)
         if out is not None:
@@ -166,16 +169,32 @@ def _models(found: "Fitted") -> Table:
     return listing
 
 
-def _estimates(found: "Fitted") -> Table:
+def _print_estimates(found: "Fitted") -> None:
+    """Of the best model: intervals of the only participant, or means and ranges over several."""
     import polars as pl
 
-    listing = table("parameter", "mean", "from", "to")
     own = found.parameters.filter(pl.col("model") == found.best)
-    for (name,), part in own.group_by("parameter", maintain_order=True):
-        estimates = part["estimate"].to_numpy()
-        ends = (estimates.mean(), estimates.min(), estimates.max())
-        listing.add_row(str(name), *(f"{end:.3f}" for end in ends))
-    return listing
+    if own["participant"].n_unique() == 1:
+        heading, listing = "with 95% intervals", table("parameter", "estimate", "from", "to")
+        rows = own.select("parameter", "estimate", "low", "high")
+    else:
+        heading, listing = "means over participants", table("parameter", "mean", "from", "to")
+        rows = own.group_by("parameter", maintain_order=True).agg(
+            pl.col("estimate").mean().alias("mean"),
+            pl.col("estimate").min().alias("low"),
+            pl.col("estimate").max().alias("high"),
+        )
+    for name, *numbers in rows.iter_rows():
+        listing.add_row(name, *(f"{number:.3f}" for number in numbers))
+    OUTPUT.print(f"\nEstimates of [bold]{found.best}[/bold], {heading}:")
+    OUTPUT.print(listing)
+
+
+def _check_out(folder: Path) -> None:
+    """Refuse what is no folder before anything is fitted."""
+    for place in (folder, *folder.parents):
+        if place.exists() and not place.is_dir():
+            raise RequestError(f"--out {folder}: {place} is a file; a folder is needed")
 
 
 def _verdict(found: "Fitted") -> str:

@@ -34,6 +34,24 @@ def save_steps(path: str | Path, participants: Mapping[str, Step]) -> None:
     step_table(participants).write_parquet(path)
 
 
+def steps_of(log: Iterable[Step]) -> Step:
+    """The steps of a session as a table, for `save_steps` and `qbumpers.fitting.fit`.
+
+    Args:
+        log: what `Session.record` returned, step by step.
+
+    Returns:
+        A table of steps: arrays in the place of each field.
+
+    Raises:
+        RequestError: if there is no step.
+    """
+    steps = list(log)
+    if not steps:
+        raise RequestError("log = []; at least one step is needed")
+    return Step(*(np.array(column) for column in zip(*steps, strict=True)))
+
+
 def step_table(participants: Mapping[str, Step]) -> pl.DataFrame:
     """A row per step: the participant, and the fields of `qbumpers.Step`.
 
