@@ -17,7 +17,7 @@ from qbumpers.simulation.cuda.card import THREADS
 from qbumpers.simulation.cuda.layout import of_one
 from tests.narrowing import present
 
-_MATHS = {"exp": 1, "log": 1, "pow": 2, "fmax": 2, "fmin": 2, "floor": 1}
+_MATHS = {"exp": 1, "log": 1, "pow": 2, "fabs": 1, "fmax": 2, "fmin": 2, "floor": 1}
 _PLACES = ("tid.x", "ctaid.x")  # of a thread, and of its block
 _SCRATCH_WORDS = 3 * THREADS
 _POINTER = re.compile(r"(?:\b(?:i\d+|double|float|ptr)|\[[^][]*\]|\{[^{}]*\}) ?\*+")
