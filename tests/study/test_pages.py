@@ -43,6 +43,15 @@ def come(page, address, code="ab12"):
     page.goto(f"http://{address}/?code={code}")
 
 
+def begin_training(page, address):
+    """Come, agree, and begin to play in the block called Training."""
+    come(page, address)
+    go(page)
+    heading(page, "Training")
+    page.click("#choices button.primary")
+    page.wait_for_selector("#overlay", state="hidden")
+
+
 def end(page, text, code=""):
     """The last page, which says why, with its code or none."""
     heading(page, "The study has ended")
@@ -85,11 +94,7 @@ def test_a_later_sitting_too_early_and_too_late(page, served, within_days):
 def test_was_that_you_is_asked_over_the_game(page, served, monkeypatch):
     monkeypatch.setattr("qbumpers.study.flow.blocks._ASKED_IF_OVERRIDDEN", 1.0)
     address, host = served(block("training", attribution=1))
-    come(page, address)
-    go(page)
-    heading(page, "Training")
-    page.click("#choices button.primary")
-    page.wait_for_selector("#overlay", state="hidden")
+    begin_training(page, address)
     check_page(page, "playing")
     page.keyboard.press("ArrowRight")
     page.wait_for_function(
@@ -111,11 +116,7 @@ def test_was_that_you_is_asked_over_the_game(page, served, monkeypatch):
 
 def test_a_task_in_real_time_is_paused(page, served):
     address, _ = served(block("training"), task="lunar-lander", step_limit=1000)
-    come(page, address)
-    go(page)
-    heading(page, "Training")
-    page.click("#choices button.primary")
-    page.wait_for_selector("#overlay", state="hidden")
+    begin_training(page, address)
     check_page(page, "in real time")
     page.click("#pause")
     page.wait_for_selector("#overlay:visible")

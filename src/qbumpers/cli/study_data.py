@@ -10,11 +10,22 @@ from qbumpers.cli.study import File, Folder, folder_of, say
 from qbumpers.errors import RequestError, counted
 
 if TYPE_CHECKING:
+    from sqlalchemy import Engine
+
+    from qbumpers.study.design.models import Study
     from qbumpers.study.outcomes.weighting import Weighted
 
 Mode = Annotated[
     str, typer.Option("--mode", help="Which records: pilot, live or simulated.", metavar="MODE")
 ]
+
+
+def _records(design: "Study", out: Path | None, mode: str) -> "Engine":
+    """The records of a study that was served or simulated."""
+    from qbumpers.study.flow.running import records_of
+    from qbumpers.study.flow.tables import read_records
+
+    return read_records(records_of(folder_of(out, design), mode))
 
 
 def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
@@ -27,12 +38,10 @@ def export_data(file: Path, to: Path, mode: str, folder: Path | None) -> None:
         folder: of the records; results/NAME if None.
     """
     from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.export import DATASET, export_study
 
     design = load_study(file)
-    engine = read_records(records_of(folder_of(folder, design), mode))
+    engine = _records(design, folder, mode)
     found = export_study(engine, design, check_playable(design), to)
     engine.dispose()
     say(f"{counted(found.participants, 'participant')} in {to / DATASET}")
@@ -47,13 +56,11 @@ def power_of_study(file: File, mode: Mode = "simulated", out: Folder = None) -> 
     """
     check_installed()
     from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.power import power_of
     from qbumpers.study.outcomes.reading import read_participants
 
     design = load_study(file)
-    engine = read_records(records_of(folder_of(out, design), mode))
+    engine = _records(design, out, mode)
     found = power_of(design, read_participants(engine, design))
     first, second = found.analysis.arms
     say(
@@ -92,15 +99,13 @@ def estimate_study(
     """
     check_installed()
     from qbumpers.study.design.sources import check_playable, load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.reading import read_participants
     from qbumpers.study.outcomes.weighting import compare_settings
 
     changes = dict(options_in(context.args))
     design = load_study(file)
     setups = check_playable(design)
-    engine = read_records(records_of(folder_of(out, design), mode))
+    engine = _records(design, out, mode)
     everybody = read_participants(engine, design)
     given = ", ".join(f"{option} = {number}" for option, number in changes.items())
     for found in compare_settings(design, setups, everybody, condition, changes):
@@ -137,14 +142,12 @@ def forget_participant(
     check_installed()
     from qbumpers.study.design.sources import check_playable, load_study
     from qbumpers.study.flow.forgetting import delete_identities
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.deletion import forget
 
     if (participant is None) != identities:
         raise RequestError("forget: give the ID of a participant, or --identities")
     design = load_study(file)
-    engine = read_records(records_of(folder_of(out, design), mode))
+    engine = _records(design, out, mode)
     if participant is None:
         say(f"identities deleted: {delete_identities(engine)}; what they did stays")
         return
@@ -171,13 +174,11 @@ def reconcile_study(
     """
     check_installed()
     from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.reading import read_participants
     from qbumpers.study.outcomes.recruitment import identities_in, reconcile
 
     design = load_study(file)
-    engine = read_records(records_of(folder_of(out, design), mode))
+    engine = _records(design, out, mode)
     everybody = read_participants(engine, design)
     found = reconcile(design, everybody, identities_in(engine), table)
     for each in found:
@@ -195,11 +196,9 @@ def bonus_of_study(file: File, mode: Mode = "live", out: Folder = None) -> None:
     """
     check_installed()
     from qbumpers.study.design.sources import load_study
-    from qbumpers.study.flow.running import records_of
-    from qbumpers.study.flow.tables import read_records
     from qbumpers.study.outcomes.reading import read_participants
     from qbumpers.study.outcomes.recruitment import bonus_table, identities_in
 
     design = load_study(file)
-    engine = read_records(records_of(folder_of(out, design), mode))
+    engine = _records(design, out, mode)
     print(bonus_table(design, read_participants(engine, design), identities_in(engine)), end="")
