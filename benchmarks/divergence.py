@@ -15,6 +15,7 @@ import numpy as np
 from measuring import Row, Timed, alternate, compared, is_quick, show, watched
 from numba import cuda as numba_cuda
 from numba.core import config
+from plain_gpu import short_stream
 
 from qbumpers.cores import usable_cores
 from qbumpers.errors import RequestError
@@ -36,7 +37,7 @@ SHARED_BYTES = 27 * 1024
 at a time take less room in its caches, which is another matter."""
 
 _FULL = (1 << 17, 100, 3)  # learners, episodes, rounds
-_QUICK = (64, 2, 1)
+_QUICK = (8, 2, 1)
 
 
 class Table(NamedTuple):
@@ -80,21 +81,6 @@ def table_of(name: str) -> tuple[Table, Sizes]:
         dynamics.cumulative.astype(np.float32),
     )  # fmt: skip
     return Table(*map(cuda.to_device, arrays)), sizes
-
-
-@cuda.jit(device=True, inline="always")
-def uniform(word: Any) -> Any:
-    """Xorshift's next word of 32 bits (Marsaglia 2003)."""
-    word ^= (word << 13) & 0xFFFFFFFF
-    word ^= word >> 17
-    word ^= (word << 5) & 0xFFFFFFFF
-    return word & 0xFFFFFFFF
-
-
-@cuda.jit(device=True, inline="always")
-def share(word: Any) -> Any:
-    """A number in [0, 1) of a word."""
-    return np.float32(word >> 8) * np.float32(2.0**-24)
 
 
 @cuda.jit(device=True, inline="always")
@@ -143,36 +129,36 @@ def rate_of(episode: Any, episodes: Any) -> Any:
 def make_kernel(sizes: Sizes, way: str) -> Any:
     """The kernel that runs learners in a way."""
     states, actions, outcomes, start, limit = sizes
+    words, kind, begin, uniform = short_stream(np.float32)
 
     @cuda.jit(device=True, inline="always")
-    def step(table: Any, values: Any, state: Any, word: Any, rate: Any, learns: Any) -> Any:
-        word = uniform(word)
-        explores = learns and share(word) < rate
-        word = uniform(word)
-        action = choice(values, state, actions, explores, share(word))
-        word = uniform(word)
-        index = outcome(table, (state * actions + action) * outcomes, outcomes, share(word))
+    def step(table: Any, values: Any, state: Any, stream: Any, rate: Any, learns: Any) -> Any:
+        explores = uniform(stream) < rate and learns
+        action = choice(values, state, actions, explores, uniform(stream))
+        first = (state * actions + action) * outcomes
+        index = outcome(table, first, outcomes, uniform(stream))
         following, ended = table.following[index], table.ended[index]
         if learns:
             future = np.float32(0) if ended else best(values, following, actions)
             place = state * actions + action
             values[place] += rate * (table.reward[index] + future - values[place])
-        return following, ended, word, table.reward[index]
+        return following, ended, table.reward[index]
 
     @cuda.jit(device=True, inline="always")
     def in_episodes(table: Any, values: Any, learner: Any, episodes: Any, found: Any,
                     steps: Any) -> None:  # fmt: skip
-        word, taken, total = learner * 2654435761 % 4294967295 + 1, 0, np.float32(0)
+        stream, taken, total = cuda.local.array(words, kind), 0, np.float32(0)
+        begin(learner, stream)
         for episode in range(episodes):
             rate = rate_of(episode, episodes)
             state, ended, length = start, 0, 0
             while length < limit and not ended:
-                state, ended, word, _ = step(table, values, state, word, rate, True)
+                state, ended, _ = step(table, values, state, stream, rate, True)
                 length += 1
             taken += length
             state, ended, length = start, 0, 0
             while length < limit and not ended:
-                state, ended, word, reward = step(table, values, state, word, rate, False)
+                state, ended, reward = step(table, values, state, stream, rate, False)
                 length += 1
                 total += reward
             taken += length
@@ -182,11 +168,12 @@ def make_kernel(sizes: Sizes, way: str) -> Any:
     @cuda.jit(device=True, inline="always")
     def in_steps(table: Any, values: Any, learner: Any, episodes: Any, found: Any,
                  steps: Any) -> None:  # fmt: skip
-        word, taken, total = learner * 2654435761 % 4294967295 + 1, 0, np.float32(0)
+        stream, taken, total = cuda.local.array(words, kind), 0, np.float32(0)
+        begin(learner, stream)
         episode, learns, state, length = 0, True, start, 0
         rate = rate_of(0, episodes)
         while episode < episodes:
-            state, ended, word, reward = step(table, values, state, word, rate, learns)
+            state, ended, reward = step(table, values, state, stream, rate, learns)
             length += 1
             total += np.float32(0) if learns else reward
             if ended or length == limit:
@@ -263,9 +250,11 @@ def _timed(task: str, way: str, learners: int, episodes: int) -> Timed:
     return timed
 
 
-def at_work(task: str, assistant: str, trials: int) -> Row:
+def at_work(task: str, assistant: str, trials: int, episodes: int) -> Row:
     """Share of the threads that are at work, if groups of them end each episode together."""
-    outcomes = simulate(task, assistant, trials=trials, workers=usable_cores()).outcomes
+    outcomes = simulate(
+        task, assistant, trials=trials, episodes=episodes, workers=usable_cores()
+    ).outcomes
     steps = longest = 0
     for lengths in (outcomes.assisted_length, outcomes.unassisted_length):
         groups = lengths.reshape(-1, LANES, lengths.shape[1])
@@ -276,15 +265,15 @@ def at_work(task: str, assistant: str, trials: int) -> Row:
 
 def measure(quick: bool) -> Iterator[Row]:
     """Every row of this benchmark; of a card none, with a sentence, if there is none."""
+    learners, episodes, rounds = _QUICK if quick else _FULL
     for task in TASKS:
         for assistant in ("none", "maximal"):
-            yield at_work(task, assistant, LANES if quick else 100 * LANES)
+            yield at_work(task, assistant, LANES if quick else 100 * LANES, episodes)
     try:
         device_of("gpu")
     except RequestError as error:
         print(f"Skipped: {error}")
         return
-    learners, episodes, rounds = _QUICK if quick else _FULL
     for task in TASKS[:1] if quick else TASKS:
         _check_agreement(task, learners, episodes)
         rates = alternate({way: _timed(task, way, learners, episodes) for way in WAYS}, rounds)
